@@ -1,0 +1,1 @@
+"""Physics as functions of arrays: no files, no Mitsuba."""
