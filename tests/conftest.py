@@ -1,0 +1,37 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+def _shared(folder: str) -> Path:
+    """Return a folder of the shared reference material, or skip: the project is complete without it."""
+    roots = [Path(p) for p in (os.environ.get("SHENRON_RT_SHARED"),) if p]
+    roots.append(Path(__file__).resolve().parents[2] / "shared")
+    for root in roots:
+        if (root / folder).is_dir():
+            return root / folder
+    pytest.skip(f"no shared {folder} folder beside the checkout (set SHENRON_RT_SHARED)")
+
+
+@pytest.fixture(scope="session")
+def shared_reference() -> Path:
+    """Folder of the reference tables."""
+    return _shared("reference")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of the real meshes and LiDAR frames."""
+    return _shared("data")
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Generator with a fixed seed."""
+    return np.random.default_rng(20_250_101)
