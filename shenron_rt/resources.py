@@ -48,7 +48,7 @@ def find(kind: Kind, name_or_path: str | os.PathLike[str]) -> Path:
         With the names that exist and the folders that were searched.
     """
     given = Path(name_or_path)
-    if given.suffix in _SUFFIXES or given.parent != Path("."):
+    if given.suffix in _SUFFIXES or given.parent != Path():
         if given.is_file():
             return given
         raise NotFoundError(f"{kind[:-1]} file {str(given)!r} does not exist")

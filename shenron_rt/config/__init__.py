@@ -1,0 +1,1 @@
+"""Profiles, materials and scenes as frozen models read from YAML."""

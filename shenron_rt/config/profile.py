@@ -1,0 +1,371 @@
+"""Radar profiles: waveform, array, antenna, receiver. Derived numbers are properties, never keys."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from .._typing import FloatArray
+from ..constants import BOLTZMANN, SPEED_OF_LIGHT
+from ..errors import ConfigError
+from ..physics.antenna import AntennaPattern, CosinePattern, GaussianPattern, IsotropicPattern, TabulatedPattern
+from ..resources import find
+from ._base import ConfigModel, Vector3
+from .loader import parse_model
+
+__all__ = ["Antenna", "Array", "Processing", "RadarProfile", "Receiver", "Waveform", "load_profile"]
+
+Positive = Annotated[float, Field(gt=0)]
+WindowName = Literal["rect", "hann", "hamming", "blackmanharris", "taylor", "chebyshev"]
+
+
+class Waveform(ConfigModel):
+    """A frame of linear up-chirps.
+
+    ``bandwidth_hz`` is swept during the sampled window ``samples / sample_rate_hz``; ``chirps`` counts loops, that is
+    chirps per transmitter; ``chirp_period_s`` is the interval between the starts of consecutive chirps, one number or
+    a pattern that repeats.
+    """
+
+    carrier_hz: Annotated[float, Field(gt=1e9, lt=1e12)]
+    bandwidth_hz: Positive
+    samples: Annotated[int, Field(ge=2)]
+    sample_rate_hz: Positive
+    chirps: Annotated[int, Field(ge=1)]
+    chirp_period_s: Positive | tuple[Positive, ...]
+    adc_start_s: Annotated[float, Field(ge=0)] = 0.0
+    adc: Literal["complex", "real"] = "complex"
+
+    @model_validator(mode="after")
+    def _chirps_do_not_overlap(self) -> Self:
+        needed = self.adc_start_s + self.sampled_time_s
+        if not self.periods_s or min(self.periods_s) < needed * (1 - 1e-9):
+            raise ValueError(
+                f"chirp_period_s {self.chirp_period_s} is shorter than adc_start_s + samples / sample_rate_hz = {needed:.6g} s"
+            )
+        return self
+
+    @property
+    def periods_s(self) -> tuple[float, ...]:
+        """The repeating pattern of chirp intervals [s]."""
+        return self.chirp_period_s if isinstance(self.chirp_period_s, tuple) else (self.chirp_period_s,)
+
+    @property
+    def sampled_time_s(self) -> float:
+        """Length of the sampled window of a chirp [s]."""
+        return self.samples / self.sample_rate_hz
+
+    @property
+    def slope_hz_per_s(self) -> float:
+        """Chirp slope k [Hz/s]."""
+        return self.bandwidth_hz / self.sampled_time_s
+
+    @property
+    def center_hz(self) -> float:
+        """f_c = f0 + k t_mid, t_mid the middle of the sampled window [Hz]."""
+        return self.carrier_hz + self.slope_hz_per_s * (self.adc_start_s + self.sampled_time_s / 2)
+
+
+class Array(ConfigModel):
+    """Transmitters and receivers, in half wavelengths (``tx``, ``rx``, or ``line: n``) or metres (``tx_m``, ``rx_m``).
+
+    Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at z = r.
+    ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
+    """
+
+    multiplex: Literal["simultaneous", "tdm", "bpm"] = "simultaneous"
+    line: Annotated[int, Field(ge=1)] | None = None
+    tx: tuple[Vector3, ...] | None = None
+    rx: tuple[Vector3, ...] | None = None
+    tx_m: tuple[Vector3, ...] | None = None
+    rx_m: tuple[Vector3, ...] | None = None
+    design_frequency_hz: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_way_to_say_it(self) -> Self:
+        ways = [self.line is not None, self.tx is not None or self.rx is not None]
+        ways.append(self.tx_m is not None or self.rx_m is not None)
+        if sum(ways) != 1:
+            raise ValueError("give exactly one of: line, tx and rx (half wavelengths), tx_m and rx_m (metres)")
+        if ways[1] and not (self.tx and self.rx):
+            raise ValueError("tx and rx are needed together, each with at least one [x, y, z]")
+        if ways[2] and not (self.tx_m and self.rx_m):
+            raise ValueError("tx_m and rx_m are needed together, each with at least one [x, y, z]")
+        if self.line is not None and self.multiplex != "simultaneous":
+            raise ValueError(f"multiplex {self.multiplex} needs tx and rx positions; line has one transmitter")
+        return self
+
+
+class Antenna(ConfigModel):
+    """One-way element pattern, the same for transmit and receive, with half-power full widths.
+
+    ``radome_loss_db`` is the two-way loss of radome and front end together.
+    """
+
+    pattern: Literal["gaussian", "cosn", "table", "isotropic"] = "gaussian"
+    beamwidth_az_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    beamwidth_el_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    table_az: tuple[tuple[float, float], ...] | None = None
+    table_el: tuple[tuple[float, float], ...] | None = None
+    gain_tx_dbi: float = 0.0
+    gain_rx_dbi: float = 0.0
+    polarization: Literal["VV", "HH", "HV", "VH"] = "VV"
+    radome_loss_db: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _pattern_has_its_numbers(self) -> Self:
+        if self.pattern in ("gaussian", "cosn") and None in (self.beamwidth_az_deg, self.beamwidth_el_deg):
+            raise ValueError(f"pattern {self.pattern} needs beamwidth_az_deg and beamwidth_el_deg")
+        if self.pattern == "table" and not (self.table_az and self.table_el):
+            raise ValueError("pattern table needs table_az and table_el, lists of [angle_deg, level_db]")
+        return self
+
+
+class Receiver(ConfigModel):
+    """Levels and the receiver chain."""
+
+    tx_power_dbm: float
+    noise_figure_db: Annotated[float, Field(ge=0)]
+    temperature_k: Positive = 290.0
+    adc_bits: Annotated[int, Field(ge=2, le=24)] | None = None
+    full_scale_dbm: float | None = None
+
+    @model_validator(mode="after")
+    def _bits_need_a_scale(self) -> Self:
+        if (self.adc_bits is None) != (self.full_scale_dbm is None):
+            raise ValueError("adc_bits and full_scale_dbm are needed together")
+        return self
+
+
+class Processing(ConfigModel):
+    """Defaults of the processing chain for this radar."""
+
+    range_window: WindowName = "hann"
+    doppler_window: WindowName = "hann"
+    pfa: Annotated[float, Field(gt=0, lt=1)] = 1e-3
+    blanking_m: Annotated[float, Field(ge=0)] = 0.0
+
+
+class RadarProfile(ConfigModel):
+    """A radar: everything that fixes its data and their axes."""
+
+    name: str
+    description: str = ""
+    waveform: Waveform
+    array: Array
+    antenna: Antenna
+    receiver: Receiver
+    processing: Processing = Processing()
+    sources: Mapping[str, str] = {}
+
+    # ---- waveform
+    @property
+    def slope_hz_per_s(self) -> float:
+        """Chirp slope k [Hz/s]."""
+        return self.waveform.slope_hz_per_s
+
+    @property
+    def center_hz(self) -> float:
+        """f_c = f0 + k t_mid of the sampled window [Hz]."""
+        return self.waveform.center_hz
+
+    @property
+    def wavelength_m(self) -> float:
+        """Wavelength at f_c [m]."""
+        return SPEED_OF_LIGHT / self.center_hz
+
+    @property
+    def range_resolution_m(self) -> float:
+        """C / 2B [m]."""
+        return SPEED_OF_LIGHT / (2 * self.waveform.bandwidth_hz)
+
+    @property
+    def n_range(self) -> int:
+        """Range bins without zero padding: all samples of a complex ADC, half of them of a real one."""
+        return self.waveform.samples // (2 if self.waveform.adc == "real" else 1)
+
+    @property
+    def max_range_m(self) -> float:
+        """Unambiguous range: n_range bins [m]."""
+        return self.n_range * self.range_resolution_m
+
+    @property
+    def n_chirps_per_loop(self) -> int:
+        """Chirps in one loop: n_tx under TDM and BPM, else 1."""
+        return 1 if self.array.multiplex == "simultaneous" else self.n_tx
+
+    @cached_property
+    def raw_chirp_start_s(self) -> FloatArray:
+        """(n_loops, n_chirps_per_loop) start of every transmitted chirp from the frame's start [s]."""
+        count = self.waveform.chirps * self.n_chirps_per_loop
+        steps = np.resize(np.asarray(self.waveform.periods_s, dtype=np.float64), max(count - 1, 0))
+        starts = np.concatenate([[0.0], np.cumsum(steps)])
+        return starts.reshape(self.waveform.chirps, self.n_chirps_per_loop)
+
+    @property
+    def loop_period_s(self) -> float:
+        """Mean interval between loops, the slow-time sampling of one virtual channel [s]."""
+        return float(np.mean(self.waveform.periods_s)) * self.n_chirps_per_loop
+
+    @property
+    def max_velocity_mps(self) -> float:
+        """v_max = lambda / (4 T_loop) [m/s]; velocities are seen in [-v_max, v_max)."""
+        return self.wavelength_m / (4 * self.loop_period_s)
+
+    @property
+    def velocity_resolution_mps(self) -> float:
+        """Lambda / (2 N T_loop) [m/s]."""
+        return self.wavelength_m / (2 * self.waveform.chirps * self.loop_period_s)
+
+    @property
+    def frame_mid_s(self) -> float:
+        """Middle of the frame from its start: mean of first and last chirp start, plus t_mid of the window [s]."""
+        starts = self.raw_chirp_start_s
+        t_mid = self.waveform.adc_start_s + self.waveform.sampled_time_s / 2
+        return float(starts[0, 0] + starts[-1, -1]) / 2 + t_mid
+
+    # ---- array
+    @property
+    def half_wavelength_m(self) -> float:
+        """The unit of ``array.tx`` and ``array.rx`` [m]."""
+        return SPEED_OF_LIGHT / (2 * (self.array.design_frequency_hz or self.center_hz))
+
+    @cached_property
+    def tx_m(self) -> FloatArray:
+        """(n_tx, 3) transmitters, radar frame [m]."""
+        if self.array.tx_m is not None:
+            return np.asarray(self.array.tx_m, dtype=np.float64)
+        if self.array.tx is not None:
+            return np.asarray(self.array.tx, dtype=np.float64) * self.half_wavelength_m
+        return np.zeros((1, 3))
+
+    @cached_property
+    def rx_m(self) -> FloatArray:
+        """(n_rx, 3) receivers, radar frame [m]."""
+        if self.array.rx_m is not None:
+            return np.asarray(self.array.rx_m, dtype=np.float64)
+        if self.array.rx is not None:
+            return np.asarray(self.array.rx, dtype=np.float64) * self.half_wavelength_m
+        line = np.zeros((self.array.line or 1, 3))
+        line[:, 1] = -np.arange(len(line)) * self.half_wavelength_m
+        return line
+
+    @property
+    def n_tx(self) -> int:
+        """Transmitters."""
+        return len(self.tx_m)
+
+    @property
+    def n_rx(self) -> int:
+        """Receivers."""
+        return len(self.rx_m)
+
+    @property
+    def n_virtual(self) -> int:
+        """Virtual channels, index tx * n_rx + rx."""
+        return self.n_tx * self.n_rx
+
+    @cached_property
+    def positions_m(self) -> FloatArray:
+        """(n_virtual, 3) tx + rx position (two-way sum) from the mount origin [m]."""
+        return (self.tx_m[:, None] + self.rx_m[None]).reshape(-1, 3)
+
+    @cached_property
+    def chirp_start_s(self) -> FloatArray:
+        """(n_loops, n_virtual) start of the chirp behind each row of the cube; under BPM the mean over the block [s]."""
+        raw = self.raw_chirp_start_s
+        if self.array.multiplex == "tdm":
+            return np.repeat(raw, self.n_rx, axis=1)
+        return np.repeat(raw.mean(axis=1, keepdims=True), self.n_virtual, axis=1)
+
+    # ---- levels
+    @cached_property
+    def pattern(self) -> AntennaPattern:
+        """One-way element pattern relative to its peak."""
+        a = self.antenna
+        az, el = np.radians(a.beamwidth_az_deg or 0.0), np.radians(a.beamwidth_el_deg or 0.0)
+        if a.pattern == "gaussian":
+            return GaussianPattern(float(az), float(el))
+        if a.pattern == "cosn":
+            return CosinePattern(float(az), float(el))
+        if a.pattern == "table":
+            return TabulatedPattern.from_deg(a.table_az or (), a.table_el or ())
+        return IsotropicPattern()
+
+    @property
+    def tx_power_w(self) -> float:
+        """Transmit power of one transmitter [W]."""
+        return float(10 ** ((self.receiver.tx_power_dbm - 30) / 10))
+
+    @property
+    def noise_power_w(self) -> float:
+        """Noise per complex sample of one receiver, k T0 F f_s [W]; a real ADC has half of it per real sample."""
+        noise_figure = 10 ** (self.receiver.noise_figure_db / 10)
+        return BOLTZMANN * self.receiver.temperature_k * float(noise_figure) * self.waveform.sample_rate_hz
+
+    @property
+    def unconfirmed(self) -> dict[str, str]:
+        """Keys whose source is not a retrievable document, with what is said of them."""
+        return {k: v for k, v in self.sources.items() if v.lower().startswith(("unconfirmed", "assumption"))}
+
+    def derived(self) -> dict[str, float]:
+        """Return the derived numbers by name, unit in the name."""
+        return {
+            "center_frequency_hz": self.center_hz,
+            "wavelength_m": self.wavelength_m,
+            "slope_hz_per_s": self.slope_hz_per_s,
+            "range_resolution_m": self.range_resolution_m,
+            "max_range_m": self.max_range_m,
+            "loop_period_s": self.loop_period_s,
+            "max_velocity_mps": self.max_velocity_mps,
+            "velocity_resolution_mps": self.velocity_resolution_mps,
+            "n_virtual": float(self.n_virtual),
+            "noise_power_dbm": 10 * float(np.log10(self.noise_power_w)) + 30,
+        }
+
+    def __repr__(self) -> str:
+        w = self.waveform
+        return (
+            f"RadarProfile({self.name!r}, {w.carrier_hz / 1e9:g} GHz + {w.bandwidth_hz / 1e6:g} MHz, "
+            f"{w.chirps} loops x {self.n_virtual} channels x {w.samples} samples, "
+            f"{self.range_resolution_m:.3f} m to {self.max_range_m:.1f} m, +-{self.max_velocity_mps:.2f} m/s)"
+        )
+
+
+def load_profile(name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> RadarProfile:
+    """Load a radar profile.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        ``"awrl1432"``, or a YAML file.
+    overrides : mapping, optional
+        Dotted keys, for example ``{"receiver.noise_figure_db": 12}``.
+
+    Returns
+    -------
+    RadarProfile
+
+    Raises
+    ------
+    NotFoundError
+        No such profile; the message lists those that exist.
+    ConfigError
+        The file has problems; one line each, with file, line and key.
+
+    Examples
+    --------
+    >>> load_profile("awrl1432").range_resolution_m.__round__(4)
+    0.3747
+    """
+    file: Path = find("profiles", name_or_path)
+    profile = parse_model(RadarProfile, file, overrides)
+    if file.stem != profile.name:
+        raise ConfigError(f"{file}: name: the file is called {file.stem!r} but says {profile.name!r}; make them equal")
+    return profile

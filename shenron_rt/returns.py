@@ -1,0 +1,109 @@
+"""Returns: what arrives at the receiver, one row an echo."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+
+from ._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from .constants import SPEED_OF_LIGHT
+from .errors import InputError
+from .io.npz import load_npz, save_npz
+
+__all__ = ["Returns"]
+
+
+@dataclass(frozen=True)
+class Returns:
+    """Echoes at the input of one receiver, in the radar frame, mid-frame.
+
+    Parameters
+    ----------
+    amplitude : (n,) complex
+        De-chirped amplitude without the carrier phase of the range, sqrt(W) RMS; ``abs(amplitude)**2`` is received
+        power.
+    position : (n, 3) float
+        The point r_c the amplitude refers to [m].
+    velocity : (n, 3) float
+        Of that point relative to the radar, p(t) = position + velocity t about mid-frame [m/s].
+    object_id : (n,) uint32
+    tag : (n,) uint8
+    coherent : (n,) bool
+        True where the phase is that of the geometry, False for speckle.
+    bounces : (n,) uint8
+        Surfaces met on the way.
+    scatterer : (n,) int64
+        Row of the :class:`~shenron_rt.scatterers.Scatterers` it came from.
+    center_hz : float
+        f_c of the profile, for the phase sum of :meth:`power_by_object` [Hz].
+    model : str
+        The echo model.
+    """
+
+    amplitude: ComplexArray
+    position: FloatArray
+    velocity: FloatArray
+    object_id: IntArray
+    tag: IntArray
+    coherent: BoolArray
+    bounces: IntArray
+    scatterer: IntArray
+    center_hz: float
+    model: str = "physical"
+
+    def __post_init__(self) -> None:
+        n = len(self.amplitude)
+        for name in ("object_id", "tag", "coherent", "bounces", "scatterer"):
+            if np.shape(getattr(self, name)) != (n,):
+                raise InputError(f"Returns.{name}: shape ({n},) is needed, got {np.shape(getattr(self, name))}")
+        for name in ("position", "velocity"):
+            if np.shape(getattr(self, name)) != (n, 3):
+                raise InputError(f"Returns.{name}: shape ({n}, 3) is needed, got {np.shape(getattr(self, name))}")
+
+    def __len__(self) -> int:
+        return len(self.amplitude)
+
+    def __repr__(self) -> str:
+        return f"Returns({len(self)} echoes, {int(self.coherent.sum())} coherent, model {self.model!r})"
+
+    @property
+    def delay_s(self) -> FloatArray:
+        """(n,) two-way delay at mid-frame from the origin of the radar frame, the array's phase reference [s]."""
+        delay: FloatArray = 2.0 / SPEED_OF_LIGHT * np.linalg.norm(self.position, axis=1)
+        return delay
+
+    def power_by_object(self) -> dict[int, float]:
+        """Return received power of every object [W].
+
+        abs(sum over its coherent echoes of a e^{j 2 pi f_c tau})^2 + sum over its incoherent ones of abs(a)^2, at the
+        array's phase reference, mid-frame.
+        """
+        ids, row = np.unique(self.object_id, return_inverse=True)
+        phasor = self.amplitude * np.exp(2j * np.pi * self.center_hz * self.delay_s)
+        phasor = np.where(self.coherent, phasor, 0.0)
+        re = np.bincount(row, phasor.real, len(ids))
+        im = np.bincount(row, phasor.imag, len(ids))
+        speckle = np.bincount(row, np.where(self.coherent, 0.0, np.abs(self.amplitude) ** 2), len(ids))
+        total = re**2 + im**2 + speckle
+        return {int(i): float(p) for i, p in zip(ids, total, strict=True)}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Save every field, and ``delay_s``, to an ``.npz`` file."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        save_npz(path, arrays | {"delay_s": self.delay_s})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Load what :meth:`save` wrote.
+
+        Raises
+        ------
+        NotFoundError, InputError
+        """
+        names = [f.name for f in fields(cls)]
+        arrays: dict[str, Any] = load_npz(path, names)
+        values = {name: arrays[name] for name in names}
+        return cls(**(values | {"center_hz": float(values["center_hz"]), "model": str(values["model"])}))
