@@ -1,0 +1,1 @@
+"""Meshes and their tags, ready-made shapes, actors and motion."""
