@@ -110,7 +110,7 @@ class TaggedMesh:
     @cached_property
     def _cross(self) -> FloatArray:
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return np.cross(b - a, c - a)
+        return np.asarray(np.cross(b - a, c - a), dtype=np.float64)
 
     @cached_property
     def face_area(self) -> FloatArray:
@@ -121,7 +121,8 @@ class TaggedMesh:
     def face_normal(self) -> FloatArray:
         """(f, 3) unit normal by the right-hand rule of the winding; zero for a face without area."""
         length = np.linalg.norm(self._cross, axis=1, keepdims=True)
-        return np.divide(self._cross, length, out=np.zeros_like(self._cross), where=length > 0)
+        normal: FloatArray = np.divide(self._cross, length, out=np.zeros_like(self._cross), where=length > 0)
+        return normal
 
     @cached_property
     def face_tag(self) -> IntArray:

@@ -11,12 +11,21 @@ from ...errors import InputError, NotFoundError
 from ..mesh import TaggedMesh, build_mesh
 from ..mesh_frames import mesh_matrix
 from ._raw import RawMesh
+from .gltf import read_gltf
+from .mitsuba_xml import read_mitsuba_xml
 from .obj import read_obj
+from .ply import read_ply
+from .stl import read_stl
 
 __all__ = ["MESH_SUFFIXES", "read_mesh"]
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
     ".obj": read_obj,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".xml": read_mitsuba_xml,
 }
 
 #: File name endings that :func:`read_mesh` takes.

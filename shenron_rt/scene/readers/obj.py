@@ -16,6 +16,7 @@ import numpy as np
 from ..._typing import FloatArray, IntArray
 from ...errors import InputError
 from ..mesh import Part
+from ._polygons import fan
 from ._raw import RawMesh, read_bytes
 
 __all__ = ["read_obj"]
@@ -125,13 +126,4 @@ def _faces(file: Path, lines: list[str], before: IntArray, n_vertices: int) -> t
             f"{file}: {int(wrong.sum())} face corners name vertices that do not exist "
             f"(first: {int(flat[wrong][0])}, the file has 1 to {n_vertices})"
         )
-    return _fan(index, count)
-
-
-def _fan(index: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
-    """Split polygons, given as flat corner indices and corners per polygon, into fans around their first corner."""
-    first = np.concatenate([[0], np.cumsum(count)[:-1]])
-    source = np.repeat(np.arange(len(count)), count - 2)
-    step = np.arange(len(source)) - np.repeat(np.cumsum(count - 2) - (count - 2), count - 2)
-    start = first[source]
-    return np.stack([index[start], index[start + step + 1], index[start + step + 2]], axis=1), source
+    return fan(index, count)
