@@ -1,1 +1,87 @@
-"""Physics as functions of arrays: no files, no Mitsuba."""
+"""Physics as functions of arrays: no files, no Mitsuba.
+
+SI and radians throughout, except specific attenuation [dB/km] and weather in its customary units.
+"""
+
+from __future__ import annotations
+
+from .antenna import AntennaPattern, CosinePattern, GaussianPattern, IsotropicPattern, TabulatedPattern
+from .attenuation import fog_attenuation, gas_attenuation, liquid_water_content, rain_attenuation, two_way_loss
+from .backscatter import (
+    constant_gamma,
+    diffuse_albedo,
+    diffuse_budget,
+    geometric_optics,
+    kirchhoff,
+    lambertian,
+    limit_sigma0,
+    small_perturbation,
+)
+from .canonical import (
+    cylinder_rcs,
+    dihedral_rcs,
+    disc_rcs,
+    ellipsoid_rcs,
+    infinite_plate_rcs,
+    near_range_disc_rcs,
+    near_range_plate_rcs,
+    plate_rcs,
+    sphere_rcs,
+    tophat_rcs,
+    trihedral_rcs,
+)
+from .fresnel import SlabCoefficients, backscatter_reflection, fresnel, fresnel_cos, layered, slab
+from .link_budget import noise_power, rcs_from_power, received_power, snr
+from .noise import noise_power_per_sample
+from .permittivity import conductor_permittivity, p2040_permittivity, water_permittivity
+from .roughness import coherent_factor, rayleigh_height
+from .two_ray import two_ray_factor
+
+__all__ = [
+    "AntennaPattern",
+    "CosinePattern",
+    "GaussianPattern",
+    "IsotropicPattern",
+    "SlabCoefficients",
+    "TabulatedPattern",
+    "backscatter_reflection",
+    "coherent_factor",
+    "conductor_permittivity",
+    "constant_gamma",
+    "cylinder_rcs",
+    "diffuse_albedo",
+    "diffuse_budget",
+    "dihedral_rcs",
+    "disc_rcs",
+    "ellipsoid_rcs",
+    "fog_attenuation",
+    "fresnel",
+    "fresnel_cos",
+    "gas_attenuation",
+    "geometric_optics",
+    "infinite_plate_rcs",
+    "kirchhoff",
+    "lambertian",
+    "layered",
+    "limit_sigma0",
+    "liquid_water_content",
+    "near_range_disc_rcs",
+    "near_range_plate_rcs",
+    "noise_power",
+    "noise_power_per_sample",
+    "p2040_permittivity",
+    "plate_rcs",
+    "rain_attenuation",
+    "rayleigh_height",
+    "rcs_from_power",
+    "received_power",
+    "slab",
+    "small_perturbation",
+    "snr",
+    "sphere_rcs",
+    "tophat_rcs",
+    "trihedral_rcs",
+    "two_ray_factor",
+    "two_way_loss",
+    "water_permittivity",
+]
