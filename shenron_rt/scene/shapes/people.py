@@ -1,0 +1,69 @@
+"""A standing adult, the proportions of the soft pedestrian targets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...tags import SemanticTag
+from ._piece import Piece, ellipsoid, grid, join, tube
+
+__all__ = ["pedestrian"]
+
+# Body proportions at a height of 1.80 m, after the adult target of ISO 19206-2: shoulders 0.50 m wide, hip at 0.92 m.
+_TARGET_HEIGHT = 1.80
+
+
+def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
+    """Return a walking adult of height ``h`` facing +x, feet ``stride`` apart, about 6 k triangles [m].
+
+    Head and hands are skin, the rest clothing, the shoes rubber. Origin on the ground below the hip.
+    """
+    scale = h / _TARGET_HEIGHT
+    half = stride / 2.0 / scale
+    leg = 0.92 - 0.10
+    # Both feet reach the ground however long the stride: the hip sinks as it does in walking.
+    hip = 0.10 + np.sqrt(max(leg**2 - half**2, (0.3 * leg) ** 2))
+    rise = hip - 0.92
+    cloth = [_torso(rise)]
+    skin = [ellipsoid([0.105, 0.08, 0.135], 7, [0.02, 0.0, 1.665 + rise]), _neck(rise)]
+    shoes = []
+    for side, forward in ((1.0, half), (-1.0, -half)):
+        foot = np.array([forward, side * 0.10, 0.10])
+        top = np.array([0.0, side * 0.10, hip])
+        knee = 0.5 * (foot + top) + [0.04, 0.0, 0.0]
+        cloth.append(tube(_bent(top, knee, foot), np.linspace(0.085, 0.045, 9), 20))
+        shoes.append(ellipsoid([0.14, 0.05, 0.06], 5, foot + [0.05, 0.0, -0.04]))
+        shoulder = np.array([0.0, side * 0.21, 1.43 + rise])
+        hand = np.array([-0.7 * forward, side * 0.27, 0.86 + rise])
+        elbow = 0.5 * (shoulder + hand) + [-0.05, side * 0.02, 0.0]
+        cloth.append(tube(_bent(shoulder, elbow, hand), np.linspace(0.055, 0.035, 9), 16))
+        skin.append(ellipsoid([0.04, 0.03, 0.08], 4, hand + [0.0, 0.0, -0.05]))
+    parts = (("clothes", "clothing", cloth), ("skin", "skin", skin), ("shoes", "rubber", shoes))
+    top_of_head = 1.80 + rise
+    return [
+        Piece(name, material, SemanticTag.Pedestrians, vertices * [scale, scale, h / top_of_head], faces)
+        for name, material, patches in parts
+        for vertices, faces in [join(*patches)]
+    ]
+
+
+def _torso(rise: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """Stack of ellipses from the hip to the shoulders, closed at both ends."""
+    height = np.array([0.82, 0.84, 0.92, 1.05, 1.20, 1.35, 1.44, 1.50, 1.53]) + rise
+    deep = np.array([0.0, 0.10, 0.125, 0.11, 0.12, 0.125, 0.10, 0.06, 0.0])
+    wide = np.array([0.0, 0.13, 0.18, 0.16, 0.18, 0.215, 0.21, 0.12, 0.0])
+    fine = np.linspace(height[0], height[-1], 33)
+    angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    depth, width = np.interp(fine, height, deep), np.interp(fine, height, wide)
+    x, y = depth[:, None] * np.cos(angle), width[:, None] * np.sin(angle)
+    return grid(np.stack([x, y, np.broadcast_to(fine[:, None], x.shape)], axis=2), wrap=True)
+
+
+def _neck(rise: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    return tube([[0.0, 0.0, 1.48 + rise], [0.01, 0.0, 1.53 + rise], [0.02, 0.0, 1.58 + rise]], 0.055, 16)
+
+
+def _bent(start: np.ndarray, middle: np.ndarray, end: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    """Return 9 points on the parabola through a joint, (9, 3) [m]."""
+    t = np.linspace(0.0, 1.0, 9)[:, None]
+    return 2.0 * (t - 0.5) * (t - 1.0) * start - 4.0 * t * (t - 1.0) * middle + 2.0 * t * (t - 0.5) * end
