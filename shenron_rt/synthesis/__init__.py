@@ -1,1 +1,6 @@
 """Returns -> AdcCube."""
+
+from .adc import AdcCube
+from .synthesize import synthesize
+
+__all__ = ["AdcCube", "synthesize"]

@@ -50,7 +50,8 @@ class AdcCube:
         shape = (w.chirps, self.profile.n_virtual, w.samples)
         if np.shape(self.data) != shape:
             raise InputError(
-                f"AdcCube.data: profile {self.profile.name!r} needs shape {shape} {self.dims}, got {np.shape(self.data)}"
+                f"AdcCube.data: profile {self.profile.name!r} needs shape {shape} {self.dims}, "
+                f"got {np.shape(self.data)}"
             )
 
     def __repr__(self) -> str:

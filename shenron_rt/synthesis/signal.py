@@ -1,0 +1,158 @@
+"""What every method needs to know: the clock of the samples, the chirps behind a channel, the multiplexing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import ComplexArray, FloatArray
+from ..config.profile import RadarProfile
+from ..errors import InputError
+from ..returns import Returns
+
+__all__ = ["Clock", "Field", "Points", "decode", "hadamard", "transmitted"]
+
+
+@dataclass(frozen=True)
+class Points:
+    """The echoes as synthesis sees them: amplitude [sqrt(W)], position [m] and velocity [m/s], radar frame.
+
+    Parameters
+    ----------
+    amplitude : (n,) complex
+    position, velocity : (n, 3) float
+    """
+
+    amplitude: ComplexArray
+    position: FloatArray
+    velocity: FloatArray
+
+    @classmethod
+    def from_returns(cls, returns: Returns) -> Points:
+        """Take the columns that matter and leave out echoes of zero amplitude.
+
+        Raises
+        ------
+        InputError
+            A value is NaN or infinite.
+        """
+        columns = {
+            "amplitude": np.asarray(returns.amplitude, dtype=np.complex128),
+            "position": np.asarray(returns.position, dtype=np.float64),
+            "velocity": np.asarray(returns.velocity, dtype=np.float64),
+        }
+        for name, values in columns.items():
+            bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+            if len(bad):
+                raise InputError(
+                    f"Returns.{name}: {len(bad)} of {len(values)} rows are NaN or infinite, the first is row {bad[0]} "
+                    f"({values[bad[0]]}); finite numbers are needed"
+                )
+        heard = columns["amplitude"] != 0
+        if not heard.all():
+            columns = {name: values[heard] for name, values in columns.items()}
+        return cls(**columns)
+
+    def __len__(self) -> int:
+        return len(self.amplitude)
+
+    def __getitem__(self, rows: slice) -> Points:
+        return Points(self.amplitude[rows], self.position[rows], self.velocity[rows])
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Times and frequencies of the samples of one chirp.
+
+    Parameters
+    ----------
+    carrier_hz, slope_hz_per_s : float
+        f0, the frequency at the chirp's start, and k.
+    sample_s : (n_samples,) float
+        t = adc_start_s + n / f_s, from the chirp's start [s].
+    frame_mid_s : float
+        Middle of the frame, the instant the positions hold [s].
+    """
+
+    carrier_hz: float
+    slope_hz_per_s: float
+    sample_s: FloatArray
+    frame_mid_s: float
+
+    @classmethod
+    def of(cls, profile: RadarProfile) -> Clock:
+        """Read the clock of a profile."""
+        w = profile.waveform
+        times = w.adc_start_s + np.arange(w.samples) / w.sample_rate_hz
+        return cls(w.carrier_hz, w.slope_hz_per_s, times, profile.frame_mid_s)
+
+
+#: (clock, points, transmitter (3,), receivers (n_rx, 3), chirp starts (n,)) -> (n, n_rx, n_samples), sqrt(W)
+Field = Callable[[Clock, Points, FloatArray, FloatArray, FloatArray], ComplexArray]
+
+
+def hadamard(n: int) -> FloatArray:
+    """Return the (n, n) Hadamard matrix of Sylvester's construction, rows = chirps of a block, columns = transmitters.
+
+    Raises
+    ------
+    InputError
+        n is not a power of two.
+    """
+    if n < 1 or n & (n - 1):
+        raise InputError(
+            f"multiplex bpm with {n} transmitters: the number of transmitters must be a power of two (1, 2, 4, 8, 16 "
+            "...); use tdm, or add or drop transmitters"
+        )
+    matrix = np.ones((1, 1))
+    while len(matrix) < n:
+        matrix = np.kron(np.array([[1.0, 1.0], [1.0, -1.0]]), matrix)
+    return matrix
+
+
+def transmitted(profile: RadarProfile, points: Points, field: Field) -> ComplexArray:
+    """Return what the ADC sees before noise, chirp by chirp.
+
+    Parameters
+    ----------
+    profile : RadarProfile
+    points : Points
+    field : callable
+        Sums the echoes of one transmitter; see :data:`Field`.
+
+    Returns
+    -------
+    (n_loops, n_blocks, n_rx, n_samples) complex
+        Blocks are transmitters (simultaneous and TDM) or the chirps of a loop, in which all transmit (BPM). sqrt(W).
+    """
+    clock, starts = Clock.of(profile), profile.raw_chirp_start_s
+    shape = (len(starts), profile.n_tx, profile.n_rx, len(clock.sample_s))
+    raw = np.zeros(shape, dtype=np.complex128)
+    bpm = profile.array.multiplex == "bpm"
+    code = hadamard(profile.n_tx) if bpm else np.eye(profile.n_tx)
+    for i, tx in enumerate(profile.tx_m):
+        if bpm:
+            echo = field(clock, points, tx, profile.rx_m, starts.ravel()).reshape(shape)
+            raw += code[None, :, i, None, None] * echo
+        else:
+            raw[:, i] = field(clock, points, tx, profile.rx_m, starts[:, i if profile.array.multiplex == "tdm" else 0])
+    return raw
+
+
+def decode(profile: RadarProfile, raw: ComplexArray) -> ComplexArray:
+    """Turn raw chirps into virtual channels: (1/n_tx) sum_b H[b, i] raw_b under BPM, else a reshape.
+
+    Parameters
+    ----------
+    profile : RadarProfile
+    raw : (n_loops, n_blocks, n_rx, n_samples) complex
+
+    Returns
+    -------
+    (n_loops, n_virtual, n_samples) complex
+    """
+    if profile.array.multiplex == "bpm":
+        raw = np.einsum("bi,mbjn->mijn", hadamard(profile.n_tx) / profile.n_tx, raw)
+    return np.ascontiguousarray(raw.reshape(raw.shape[0], -1, raw.shape[-1]))

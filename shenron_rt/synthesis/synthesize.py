@@ -1,0 +1,88 @@
+"""Returns -> AdcCube."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..config.profile import RadarProfile
+from ..errors import InputError
+from ..randomness import frame_generator
+from ..returns import Returns
+from .adc import AdcCube
+from .direct import direct_field
+from .nufft import nufft_field
+from .receiver import add_noise, cube_noise_power, quantise, to_adc
+from .signal import Field, Points, decode, hadamard, transmitted
+
+__all__ = ["synthesize"]
+
+ACCURACY_MIN, ACCURACY_MAX = 1e-9, 1e-1
+
+
+def synthesize(
+    returns: Returns,
+    profile: RadarProfile,
+    *,
+    noise: str | None = "thermal",
+    seed: int | None = None,
+    frame: int = 0,
+    accuracy: float = 1e-5,
+    method: str = "nufft",
+    radar: str = "",
+) -> AdcCube:
+    """Synthesise the ADC samples of one frame.
+
+    Parameters
+    ----------
+    returns : Returns
+        Echoes in the radar frame, mid-frame. None at all gives noise alone.
+    profile : RadarProfile
+    noise : "thermal" or None
+        Thermal noise k T0 F f_s per complex sample, or none.
+    seed : int, optional
+        Seed of the noise; None is 0.
+    frame : int
+        Frame index; every frame has its own noise.
+    accuracy : float
+        Largest RMS error relative to the RMS of the noise-free cube, 1e-9 to 1e-1. ``method="direct"`` is exact.
+    method : "nufft" or "direct"
+        ``"direct"`` is the reference sum, about 50 ns for every echo and sample.
+    radar : str
+        Name of the radar, so that several radars of one frame get noise of their own.
+
+    Returns
+    -------
+    AdcCube
+
+    Raises
+    ------
+    InputError
+        An unknown option, an accuracy out of bounds, NaN in the returns, BPM with a number of transmitters that is
+        not a power of two.
+
+    Notes
+    -----
+    Channel (tx, rx) of a loop holds sum_i a_i exp(+j 2 pi (f0 tau + k tau t - k tau^2 / 2)) with
+    tau = (abs(p - tx) + abs(p - rx)) / c at the instant of the sample, p = position + velocity (T - mid-frame).
+    """
+    _check(profile, noise, accuracy, method)
+    seed = 0 if seed is None else int(seed)
+    field: Field = direct_field if method == "direct" else nufft_field(accuracy)
+    points = Points.from_returns(returns)
+    raw = to_adc(profile, transmitted(profile, points, field))
+    if noise is not None:
+        add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))
+    cube = decode(profile, quantise(profile, raw))
+    power = cube_noise_power(profile) if noise is not None else 0.0
+    return AdcCube(cube, profile, noise_power_w=power, seed=seed, frame=frame, returns=returns)
+
+
+def _check(profile: RadarProfile, noise: str | None, accuracy: float, method: str) -> None:
+    if noise not in (None, "thermal"):
+        raise InputError(f"noise {noise!r} is unknown; allowed: 'thermal', None")
+    if method not in ("nufft", "direct"):
+        raise InputError(f"method {method!r} is unknown; allowed: 'nufft', 'direct'")
+    if not (np.isfinite(accuracy) and ACCURACY_MIN <= accuracy <= ACCURACY_MAX):
+        raise InputError(f"accuracy {accuracy!r} is out of bounds; allowed: {ACCURACY_MIN:g} to {ACCURACY_MAX:g}")
+    if profile.array.multiplex == "bpm":
+        hadamard(profile.n_tx)
