@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,7 +120,8 @@ def polygon(radius: float, n: int) -> FloatArray:
     """
     angle = 2.0 * np.pi * np.arange(n) / n
     circumradius = radius * np.sqrt(2.0 * np.pi / (n * np.sin(2.0 * np.pi / n)))
-    return circumradius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    corners: FloatArray = circumradius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return corners
 
 
 def revolve(profile: ArrayLike, n: int) -> tuple[FloatArray, IntArray]:
@@ -194,9 +196,9 @@ def geodesic(frequency: int) -> tuple[FloatArray, IntArray]:
     corners = np.array([p for s, t in pairs for p in ((0.0, s, t), (s, t, 0.0), (t, 0.0, s))])
     gap = np.linalg.norm(corners[:, None] - corners[None], axis=2)
     near = np.abs(gap - 2.0) < 1e-9
-    base = np.array(
-        [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
-    )
+    triples = np.array(list(itertools.combinations(range(12), 3)))
+    i, j, k = triples.T
+    base = triples[near[i, j] & near[j, k] & near[i, k]]
     a, b, c = (corners[base[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
     base[inward] = base[inward][:, ::-1]
@@ -228,9 +230,8 @@ def ellipsoid(semi_axes: ArrayLike, frequency: int, centre: ArrayLike = (0.0, 0.
 def _weld(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge vertices closer than a billionth of the extent; order of first appearance by position."""
     extent = float(np.ptp(vertices, axis=0).max())
-    _, first, inverse = np.unique(
-        np.round(vertices / (1e-9 * extent)) + 0.0, axis=0, return_index=True, return_inverse=True
-    )
+    cell = np.round(vertices / (1e-9 * extent)) + 0.0
+    _, first, inverse = np.unique(cell, axis=0, return_index=True, return_inverse=True)
     merged = inverse.reshape(-1)[faces].astype(np.int32)
     distinct = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
     return vertices[first], merged[distinct]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..._typing import FloatArray, IntArray
 from ...tags import SemanticTag
 from ._piece import Piece, ellipsoid, grid, join, tube
 
@@ -32,12 +33,12 @@ def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
         top = np.array([0.0, side * 0.10, hip])
         knee = 0.5 * (foot + top) + [0.04, 0.0, 0.0]
         cloth.append(tube(_bent(top, knee, foot), np.linspace(0.085, 0.045, 9), 20))
-        shoes.append(ellipsoid([0.14, 0.05, 0.06], 5, foot + [0.05, 0.0, -0.04]))
+        shoes.append(ellipsoid([0.14, 0.05, 0.06], 5, foot + np.array([0.05, 0.0, -0.04])))
         shoulder = np.array([0.0, side * 0.21, 1.43 + rise])
         hand = np.array([-0.7 * forward, side * 0.27, 0.86 + rise])
         elbow = 0.5 * (shoulder + hand) + [-0.05, side * 0.02, 0.0]
         cloth.append(tube(_bent(shoulder, elbow, hand), np.linspace(0.055, 0.035, 9), 16))
-        skin.append(ellipsoid([0.04, 0.03, 0.08], 4, hand + [0.0, 0.0, -0.05]))
+        skin.append(ellipsoid([0.04, 0.03, 0.08], 4, hand + np.array([0.0, 0.0, -0.05])))
     parts = (("clothes", "clothing", cloth), ("skin", "skin", skin), ("shoes", "rubber", shoes))
     top_of_head = 1.80 + rise
     return [
@@ -47,7 +48,7 @@ def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
     ]
 
 
-def _torso(rise: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _torso(rise: float) -> tuple[FloatArray, IntArray]:
     """Stack of ellipses from the hip to the shoulders, closed at both ends."""
     height = np.array([0.82, 0.84, 0.92, 1.05, 1.20, 1.35, 1.44, 1.50, 1.53]) + rise
     deep = np.array([0.0, 0.10, 0.125, 0.11, 0.12, 0.125, 0.10, 0.06, 0.0])
@@ -59,11 +60,12 @@ def _torso(rise: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-a
     return grid(np.stack([x, y, np.broadcast_to(fine[:, None], x.shape)], axis=2), wrap=True)
 
 
-def _neck(rise: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _neck(rise: float) -> tuple[FloatArray, IntArray]:
     return tube([[0.0, 0.0, 1.48 + rise], [0.01, 0.0, 1.53 + rise], [0.02, 0.0, 1.58 + rise]], 0.055, 16)
 
 
-def _bent(start: np.ndarray, middle: np.ndarray, end: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def _bent(start: FloatArray, middle: FloatArray, end: FloatArray) -> FloatArray:
     """Return 9 points on the parabola through a joint, (9, 3) [m]."""
     t = np.linspace(0.0, 1.0, 9)[:, None]
-    return 2.0 * (t - 0.5) * (t - 1.0) * start - 4.0 * t * (t - 1.0) * middle + 2.0 * t * (t - 0.5) * end
+    curve: FloatArray = 2.0 * (t - 0.5) * (t - 1.0) * start - 4.0 * t * (t - 1.0) * middle + 2.0 * t * (t - 0.5) * end
+    return curve

@@ -26,7 +26,7 @@ def ground(l: float, w: float) -> list[Piece]:  # noqa: E741 - the interface's n
 def wall(l: float, h: float, t: float = 0.3) -> list[Piece]:  # noqa: E741 - the interface's name
     """Return a closed concrete wall: ``l`` along x, ``t`` thick along y, ``h`` tall from z = 0 [m]."""
     vertices, faces = box(l, t, h)
-    return [Piece("wall", "concrete", SemanticTag.Walls, vertices + [0.0, 0.0, h / 2.0], faces)]
+    return [Piece("wall", "concrete", SemanticTag.Walls, vertices + np.array([0.0, 0.0, h / 2.0]), faces)]
 
 
 def pole(h: float = 6.0, r: float = 0.08) -> list[Piece]:
@@ -53,6 +53,6 @@ def guard_rail(l: float = 20.0, h: float = 0.75) -> list[Piece]:  # noqa: E741 -
     vertices, faces = box(width, depth, h)
     reach = min(l / 2.0 - width / 2.0, (count - 1) * _POST_SPACING / 2.0)
     for k, x in enumerate(np.linspace(-reach, reach, count)):
-        shifted = vertices + [float(x), depth / 2.0, h / 2.0]
+        shifted = vertices + np.array([float(x), depth / 2.0, h / 2.0])
         pieces.append(Piece(f"post {k + 1}", "metal", SemanticTag.GuardRail, shifted, faces))
     return pieces

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..._typing import FloatArray
 from ...tags import SemanticTag
 from ._piece import Piece, ellipsoid, join, tube
 
@@ -36,8 +37,8 @@ def tree(h: float = 8.0, crown: float | None = None) -> list[Piece]:
     ]
 
 
-def _clumps(h: float, width: float, base: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
-    """Return the centres (n, 3) and the common semi-axes (3,) of the clumps [m]: a spiral on the crown, and its heart."""
+def _clumps(h: float, width: float, base: float) -> tuple[FloatArray, FloatArray]:
+    """Return the centres (n, 3) and the common semi-axes (3,) of the clumps [m]: a spiral round one heart."""
     size = np.array([0.24 * width, 0.24 * width, 0.17 * (h - base)])
     k = np.arange(_CLUMPS)
     up = 1.0 - 2.0 * (k + 0.5) / _CLUMPS
