@@ -218,7 +218,7 @@ def test_an_override_replaces_one_number_and_moves_what_derives_from_it() -> Non
     ],
 )
 def test_a_profile_that_cannot_be_is_refused_by_key(overrides: dict[str, Any], words: str) -> None:
-    with pytest.raises(ConfigError, match="awrl1432.yaml") as error:
+    with pytest.raises(ConfigError, match=r"awrl1432\.yaml") as error:
         load_profile("awrl1432", overrides)
     assert words in str(error.value)
 
