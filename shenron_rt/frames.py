@@ -165,7 +165,7 @@ def to_carla_pose(pose: Pose) -> tuple[tuple[float, float, float], tuple[float, 
 
 
 def spherical(points: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return range [m], azimuth (+ left) and elevation (+ up) [rad] of (..., 3) points; zero range gives zero angles."""
+    """Return range [m], azimuth (+ left) and elevation (+ up) [rad] of (..., 3) points; at zero range angles are 0."""
     p = np.asarray(points, dtype=np.float64)
     horizontal = np.hypot(p[..., 0], p[..., 1])
     return np.hypot(horizontal, p[..., 2]), np.arctan2(p[..., 1], p[..., 0]), np.arctan2(p[..., 2], horizontal)

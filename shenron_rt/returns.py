@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -13,7 +13,12 @@ from .constants import SPEED_OF_LIGHT
 from .errors import InputError
 from .io.npz import load_npz, save_npz
 
-__all__ = ["Returns"]
+if TYPE_CHECKING:
+    from .config.materials import MaterialTable
+    from .config.profile import RadarProfile
+    from .scatterers import Scatterers
+
+__all__ = ["Returns", "illuminate"]
 
 
 @dataclass(frozen=True)
@@ -107,3 +112,40 @@ class Returns:
         arrays: dict[str, Any] = load_npz(path, names)
         values = {name: arrays[name] for name in names}
         return cls(**(values | {"center_hz": float(values["center_hz"]), "model": str(values["model"])}))
+
+
+def illuminate(
+    scatterers: Scatterers,
+    profile: RadarProfile,
+    *,
+    model: str = "physical",
+    materials: MaterialTable | str | os.PathLike[str] | None = None,
+) -> Returns:
+    """Light scatterers with a radar: the echo model and the radar equation.
+
+    Parameters
+    ----------
+    scatterers : Scatterers
+        In the frame of that radar.
+    profile : RadarProfile
+    model : str
+        ``"physical"``.
+    materials : MaterialTable, name or path, optional
+        Default ``"automotive"``.
+
+    Returns
+    -------
+    Returns
+
+    Raises
+    ------
+    InputError
+        An unknown model or material.
+    """
+    if model != "physical":
+        raise InputError(f"unknown echo model {model!r}; known: physical")
+    from .config.materials import MaterialTable, load_materials
+    from .echo.physical import physical_returns
+
+    table = materials if isinstance(materials, MaterialTable) else load_materials(materials or "automotive")
+    return physical_returns(scatterers, profile, table)

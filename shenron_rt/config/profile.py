@@ -47,7 +47,8 @@ class Waveform(ConfigModel):
         needed = self.adc_start_s + self.sampled_time_s
         if not self.periods_s or min(self.periods_s) < needed * (1 - 1e-9):
             raise ValueError(
-                f"chirp_period_s {self.chirp_period_s} is shorter than adc_start_s + samples / sample_rate_hz = {needed:.6g} s"
+                f"chirp_period_s {self.chirp_period_s} is shorter than adc_start_s + samples / sample_rate_hz, "
+                f"{needed:.6g} s"
             )
         return self
 
@@ -75,8 +76,8 @@ class Waveform(ConfigModel):
 class Array(ConfigModel):
     """Transmitters and receivers, in half wavelengths (``tx``, ``rx``, or ``line: n``) or metres (``tx_m``, ``rx_m``).
 
-    Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at z = r.
-    ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
+    Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at
+    z = r. ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
     """
 
     multiplex: Literal["simultaneous", "tdm", "bpm"] = "simultaneous"
@@ -278,7 +279,7 @@ class RadarProfile(ConfigModel):
 
     @cached_property
     def chirp_start_s(self) -> FloatArray:
-        """(n_loops, n_virtual) start of the chirp behind each row of the cube; under BPM the mean over the block [s]."""
+        """(n_loops, n_virtual) start of the chirp behind each row of the cube; BPM: mean of the block [s]."""
         raw = self.raw_chirp_start_s
         if self.array.multiplex == "tdm":
             return np.repeat(raw, self.n_rx, axis=1)
@@ -336,6 +337,8 @@ class RadarProfile(ConfigModel):
             f"{w.chirps} loops x {self.n_virtual} channels x {w.samples} samples, "
             f"{self.range_resolution_m:.3f} m to {self.max_range_m:.1f} m, +-{self.max_velocity_mps:.2f} m/s)"
         )
+
+    __str__ = __repr__
 
 
 def load_profile(name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> RadarProfile:

@@ -1,0 +1,1 @@
+"""Echo models: what a scatterer sends back."""

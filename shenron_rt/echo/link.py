@@ -1,0 +1,55 @@
+"""What stands between a radar and any scatterer: both antenna patterns, powers, radome and weather."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._typing import FloatArray
+from ..frames import spherical
+from ..physics.attenuation import two_way_loss
+from ..scatterers import Weather
+
+if TYPE_CHECKING:
+    from ..config.profile import RadarProfile
+
+__all__ = ["link_amplitude"]
+
+
+def link_amplitude(profile: RadarProfile, position: FloatArray, weather: Weather | None) -> FloatArray:
+    """Return sqrt(Pt Gt Gr / L): all of the radar equation but lambda^2 sigma / ((4 pi)^3 R^4).
+
+    Parameters
+    ----------
+    profile : RadarProfile
+    position : (n, 3) float
+        Radar frame [m].
+    weather : Weather or None
+        ``None`` is no attenuation at all.
+
+    Returns
+    -------
+    (n,) float
+        [sqrt(W)].
+    """
+    antenna = profile.antenna
+    distance, azimuth, elevation = spherical(position)
+    one_way = profile.pattern(azimuth, elevation)
+    gain_db = antenna.gain_tx_dbi + antenna.gain_rx_dbi - antenna.radome_loss_db
+    power = profile.tx_power_w * 10 ** (gain_db / 10)
+    amplitude: FloatArray = np.sqrt(power) * one_way
+    if weather is not None:
+        amplitude = amplitude / np.sqrt(_loss(profile, distance, weather))
+    return amplitude
+
+
+def _loss(profile: RadarProfile, distance: FloatArray, weather: Weather) -> FloatArray:
+    return two_way_loss(
+        distance,
+        profile.center_hz,
+        rain_mm_h=weather.rain_mm_h,
+        fog_visibility_m=weather.fog_visibility_m,
+        temperature_c=weather.temperature_c,
+        polarization=profile.antenna.polarization[0],
+    )

@@ -1,0 +1,172 @@
+"""The whole chain in one call: scene to detections."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from .config.profile import RadarProfile
+from .config.scene import RadarMount, Scene
+from .dsp import Detections, RadarCube, detect, process
+from .errors import InputError
+from .frames import Pose
+from .returns import Returns, illuminate
+from .scatterers import Scatterers
+from .synthesis import AdcCube, synthesize
+from .tracing import trace
+
+__all__ = ["Frame", "simulate", "simulate_all"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of one radar, stage by stage.
+
+    Parameters
+    ----------
+    scatterers, returns, adc, cube, detections
+        What each stage made.
+    profile : RadarProfile
+        The profile that was used.
+    seed : int
+    backend : str
+        What traced the rays.
+    radar : str
+        Name of the radar.
+    time : float
+        Scene seconds at the first chirp's start [s].
+    frame : int
+        Frame index.
+    """
+
+    scatterers: Scatterers
+    returns: Returns
+    adc: AdcCube
+    cube: RadarCube
+    detections: Detections
+    profile: RadarProfile
+    seed: int
+    backend: str
+    radar: str
+    time: float
+    frame: int
+
+    def __repr__(self) -> str:
+        return (
+            f"Frame({self.frame} of radar {self.radar!r} at {self.time:g} s: {len(self.scatterers)} scatterers, "
+            f"{len(self.returns)} returns, {len(self.detections)} detections)"
+        )
+
+
+def simulate(
+    source: Scene,
+    profile: RadarProfile | None = None,
+    *,
+    radar: str | None = None,
+    time: float = 0.0,
+    seed: int | None = None,
+    frame: int = 0,
+    rays: int = 300_000,
+    max_bounces: int = 1,
+    model: str = "physical",
+    noise: str | None = "thermal",
+    mount: Pose | None = None,
+    backend: str = "auto",
+    accuracy: float = 1e-5,
+) -> Frame:
+    """Render one frame of one radar.
+
+    Parameters
+    ----------
+    source : Scene
+    profile : RadarProfile, optional
+        Replaces the radar's profile and keeps its mount.
+    radar : str, optional
+        Which radar; needed where the scene has several.
+    time : float
+        Scene seconds at the first chirp's start [s].
+    seed : int, optional
+        Default: the scene's.
+    frame : int
+        Frame index; random numbers derive from (seed, frame, radar).
+    rays, max_bounces, backend
+        As for :func:`shenron_rt.trace`.
+    model : str
+        Echo model, as for :func:`shenron_rt.illuminate`.
+    noise : str or None
+        ``"thermal"``, or ``None`` for none.
+    mount : Pose, optional
+        Replaces the radar's pose in the ego frame.
+    accuracy : float
+        Of the ADC synthesis, relative to the RMS of the noise-free cube.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    InputError
+        Several radars and none named, or what the stages raise.
+
+    Examples
+    --------
+    >>> import shenron_rt as srt
+    >>> scene = srt.Scene(point_targets=[{"id": 1, "xyz_m": (30, 0, 1), "rcs_dbsm": 10}])
+    >>> frame = srt.simulate(scene)  # doctest: +SKIP
+    """
+    if not isinstance(source, Scene):
+        raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}")
+    place = source.radar(radar)
+    if mount is not None:
+        place = place.model_copy(update={"xyz_m": mount.xyz, "ypr_deg": mount.ypr_deg})
+        source = source.model_copy(update={"radars": (place,)})
+    used = profile or source.profile_of(place)
+    scatterers = trace(
+        source,
+        used,
+        radar=place.name,
+        time=time,
+        seed=seed,
+        frame=frame,
+        rays=rays,
+        max_bounces=max_bounces,
+        backend=backend,
+    )
+    returns = illuminate(scatterers, used, model=model, materials=source.materials)
+    adc = synthesize(
+        returns, used, noise=noise, seed=scatterers.seed, frame=frame, accuracy=accuracy, radar=place.name
+    )
+    settings = used.processing
+    cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
+    detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
+    return Frame(
+        scatterers=scatterers,
+        returns=returns,
+        adc=adc,
+        cube=cube,
+        detections=detections,
+        profile=used,
+        seed=scatterers.seed,
+        backend=scatterers.backend,
+        radar=place.name,
+        time=time,
+        frame=frame,
+    )
+
+
+def simulate_all(source: Scene, **options: object) -> dict[str, Frame]:
+    """Render one frame of every radar of a scene; the options are those of :func:`simulate`.
+
+    Returns
+    -------
+    dict of str to Frame
+        By radar name, in the scene's order.
+    """
+    render = functools.partial(simulate, source, **options)  # type: ignore[arg-type]
+    return {mount.name: render(radar=mount.name) for mount in _radars(source)}
+
+
+def _radars(source: Scene) -> Iterator[RadarMount]:
+    yield from source.radars

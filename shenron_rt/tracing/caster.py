@@ -1,0 +1,70 @@
+"""Nearest hits of rays from the radar, by Mitsuba; everything metric is computed from the triangle in float64."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .._typing import FloatArray, IntArray
+from .backend import Backend, use_backend
+
+__all__ = ["RayCaster"]
+
+#: Rays handed to Mitsuba at a time; bounds memory.
+_BLOCK = 1 << 20
+
+
+class RayCaster:
+    """A set of triangles that rays from the origin can be cast at.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float
+        Relative to the radar, so that float32 keeps its precision near it [m].
+    faces : (f, 3) int
+    backend : str
+    """
+
+    def __init__(self, vertices: FloatArray, faces: IntArray, backend: Backend) -> None:
+        self.backend = backend
+        self.n_faces = len(faces)
+        self._scene: Any = None
+        self._mesh: Any = None
+        if self.n_faces:
+            with use_backend(backend) as mi:
+                self._mesh = mi.Mesh("world", len(vertices), len(faces))
+                parameters = mi.traverse(self._mesh)
+                parameters["faces"] = np.ascontiguousarray(faces, dtype=np.uint32).ravel()
+                parameters["vertex_positions"] = np.ascontiguousarray(vertices, dtype=np.float32).ravel()
+                parameters.update()
+                self._scene = mi.load_dict({"type": "scene", "world": self._mesh})
+
+    def cast(self, directions: FloatArray) -> IntArray:
+        """Return (n,) int64 row of the nearest face along each direction from the origin, -1 where nothing is hit.
+
+        Parameters
+        ----------
+        directions : (n, 3) float
+            Unit vectors.
+        """
+        if self._scene is None or len(directions) == 0:
+            return np.full(len(directions), -1, dtype=np.int64)
+        with use_backend(self.backend) as mi:
+            run = self._one_by_one if self.backend == "scalar" else self._at_once
+            blocks = [run(mi, directions[i : i + _BLOCK]) for i in range(0, len(directions), _BLOCK)]
+        return np.concatenate(blocks)
+
+    def _at_once(self, mi: Any, directions: FloatArray) -> IntArray:
+        import drjit as dr
+
+        d = np.ascontiguousarray(directions.T, dtype=np.float32)
+        ray = mi.Ray3f(mi.Point3f(0, 0, 0), mi.Vector3f(d[0], d[1], d[2]))
+        hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
+        prim = dr.select(hit.is_valid(), mi.Int(hit.prim_index), mi.Int(-1))
+        return prim.numpy().astype(np.int64)
+
+    def _one_by_one(self, mi: Any, directions: FloatArray) -> IntArray:
+        cast, Ray, origin = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f(0, 0, 0)
+        hits = (cast(Ray(origin, d), True) for d in directions.astype(np.float32).tolist())
+        return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int64, len(directions))
