@@ -33,7 +33,7 @@ from .canonical import (
 from .fresnel import SlabCoefficients, backscatter_reflection, fresnel, fresnel_cos, layered, slab
 from .link_budget import noise_power, rcs_from_power, received_power, snr
 from .noise import noise_power_per_sample
-from .permittivity import conductor_permittivity, p2040_permittivity, water_permittivity
+from .permittivity import cole_cole_permittivity, conductor_permittivity, p2040_permittivity, water_permittivity
 from .roughness import coherent_factor, rayleigh_height
 from .two_ray import two_ray_factor
 
@@ -46,6 +46,7 @@ __all__ = [
     "TabulatedPattern",
     "backscatter_reflection",
     "coherent_factor",
+    "cole_cole_permittivity",
     "conductor_permittivity",
     "constant_gamma",
     "cylinder_rcs",

@@ -6,8 +6,9 @@ A half-power beamwidth means what the word says: at half the full width the one-
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,6 +129,14 @@ class TabulatedPattern:
                 raise InputError(f"{name} cut needs finite levels over strictly increasing, finite angles")
             object.__setattr__(self, name, tuple(angles.tolist()))
             object.__setattr__(self, f"{name}_db", tuple((levels - levels.max()).tolist()))
+
+    @classmethod
+    def from_deg(cls, cut_az: Sequence[tuple[float, float]], cut_el: Sequence[tuple[float, float]]) -> Self:
+        """Return the pattern of two cuts given as (angle [deg], one-way level [dB]) pairs."""
+        (az, az_db), (el, el_db) = (
+            np.reshape(np.asarray(cut, dtype=np.float64), (-1, 2)).T for cut in (cut_az, cut_el)
+        )
+        return cls(tuple(np.radians(az).tolist()), tuple(az_db), tuple(np.radians(el).tolist()), tuple(el_db))
 
     def __call__(self, azimuth: ArrayLike, elevation: ArrayLike) -> FloatArray:
         """Return the relative power gain; azimuth in (-pi, pi]."""

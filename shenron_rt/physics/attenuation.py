@@ -211,8 +211,8 @@ def liquid_water_content(visibility_m: ArrayLike) -> FloatArray:
 
     References
     ----------
-    .. [1] R. G. Eldridge, J. Atmos. Sci. 23, 605-613 (1966), as used by E. E. Altshuler, IEEE Trans. Antennas Propag. 32,
-       757-758 (1984), doi:10.1109/TAP.1984.1143395.
+    .. [1] R. G. Eldridge, J. Atmos. Sci. 23, 605-613 (1966), as used by E. E. Altshuler, IEEE Trans. Antennas
+       Propag. 32, 757-758 (1984), doi:10.1109/TAP.1984.1143395.
     """
     visibility = np.asarray(visibility_m, dtype=np.float64)
     if np.any(~(visibility > 0.0)):

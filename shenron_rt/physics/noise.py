@@ -35,4 +35,4 @@ def noise_power_per_sample(
             "allowed: > 0, >= 0, >= 0"
         )
     system_k = temperature_k + T0 * (10.0 ** (0.1 * noise_figure_db) - 1.0)
-    return BOLTZMANN * system_k * sample_rate_hz * (0.5 if real_adc else 1.0)
+    return float(BOLTZMANN * system_k * sample_rate_hz * (0.5 if real_adc else 1.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, did_you_mean
 
-__all__ = ["P2040", "P2040Fit", "conductor_permittivity", "p2040_permittivity", "water_permittivity"]
+__all__ = [
+    "P2040",
+    "P2040Fit",
+    "cole_cole_permittivity",
+    "conductor_permittivity",
+    "p2040_permittivity",
+    "water_permittivity",
+]
 
 #: sigma/(2 pi eps0 f) with sigma in S/m and f in GHz, as rounded in P.2040-3, equation (12).
 _LOSS_FACTOR = 17.98
@@ -129,3 +137,37 @@ def water_permittivity(frequency_hz: ArrayLike, temperature_c: ArrayLike = 20.0)
     secondary_ghz = 39.8 * principal_ghz
     eps = (static - middle) / (1.0 + 1j * f / principal_ghz)
     return np.asarray(eps + (middle - optical) / (1.0 + 1j * f / secondary_ghz) + optical)
+
+
+def cole_cole_permittivity(
+    frequency_hz: ArrayLike,
+    eps_inf: float,
+    terms: Sequence[tuple[float, float, float]],
+    conductivity_s_per_m: float = 0.0,
+) -> NDArray[np.complex128]:
+    """Return the permittivity of a sum of Cole-Cole relaxations.
+
+    Parameters
+    ----------
+    frequency_hz : array_like
+        Frequency, > 0. [Hz]
+    eps_inf : float
+        Permittivity far above all relaxations. [-]
+    terms : sequence of (delta, relaxation_s, alpha)
+        Step [-], relaxation time [s] and broadening [-, 0 to 1] of each dispersion; alpha = 0 is Debye's.
+    conductivity_s_per_m : float
+        Static ionic conductivity. [S/m]
+
+    Returns
+    -------
+    complex array, eps' - j eps''
+
+    References
+    ----------
+    .. [1] K. S. Cole, R. H. Cole, J. Chem. Phys. 9, 341 (1941), doi:10.1063/1.1750906.
+    """
+    omega = 2.0 * math.pi * np.asarray(frequency_hz, dtype=np.float64)
+    eps = eps_inf - 1j * conductivity_s_per_m * _LOSS_FACTOR * 1e9 * 2.0 * math.pi / omega
+    for delta, relaxation, alpha in terms:
+        eps = eps + delta / (1.0 + (1j * omega * relaxation) ** (1.0 - alpha))
+    return np.asarray(eps)
