@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..constants import PATTERN_FLOOR_TWO_WAY_DB
 from ..frames import rotation_matrix, spherical
 from ..physics.antenna import AntennaPattern
@@ -29,20 +29,29 @@ class Cells:
     direction : (n, 3) float
         Unit vectors.
     edges : (n, 2, 3) float
-        Half edges: the corners are the directions d +- e_u +- e_v (not of unit length), e_u x e_v points outward.
+        Half edges before ``turn``: the corners are the directions d +- e_u +- e_v (not of unit length), e_u x e_v
+        points outward.
     solid_angle : (n,) float
         [sr].
     spacing : float
         Angle between neighbours [rad].
+    turn : (3, 3) float or None
+        Rotation still to be applied to ``edges``; directions have had it. Most cells hit nothing.
     """
 
     direction: FloatArray
     edges: FloatArray
     solid_angle: FloatArray
     spacing: float
+    turn: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.direction)
+
+    def edges_of(self, cells: IntArray) -> FloatArray:
+        """Return (m, 2, 3) half edges of some cells, turned with the grid."""
+        edges = self.edges[cells]
+        return edges if self.turn is None else (edges.reshape(-1, 3) @ self.turn.T).reshape(-1, 2, 3)
 
 
 def _patch(axes: FloatArray, x_edges: FloatArray, y_edges: FloatArray, spacing: float) -> Cells:
@@ -61,7 +70,7 @@ def _patch(axes: FloatArray, x_edges: FloatArray, y_edges: FloatArray, spacing: 
         x_edges[:, None] * y_edges[None], np.sqrt(1 + x_edges[:, None] ** 2 + y_edges[None] ** 2)
     )
     solid = (corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]).ravel()
-    return Cells(local @ axes, edges @ axes, solid, spacing)
+    return Cells(local @ axes, (edges.reshape(-1, 3) @ axes).reshape(-1, 2, 3), solid, spacing)
 
 
 # Faces of the cube: outward normal and two tangents, right-handed seen from outside.
@@ -126,7 +135,7 @@ def turned(cells: Cells, shift: FloatArray) -> Cells:
     """
     yaw, pitch = np.degrees(np.asarray(shift) * cells.spacing)
     R = rotation_matrix((yaw, pitch, 0.0))
-    return Cells(cells.direction @ R.T, cells.edges @ R.T, cells.solid_angle, cells.spacing)
+    return Cells(cells.direction @ R.T, cells.edges, cells.solid_angle, cells.spacing, R)
 
 
 def aimed_cells(points: FloatArray, rays: int, shift: FloatArray) -> Cells | None:

@@ -198,7 +198,7 @@ def _rows(world: World, launch: _Launch, face: IntArray, cell: IntArray) -> dict
         "velocity": velocity,
         "normal": normal * facing[:, None],
         "material": world.face_material[face],
-        "footprint": launch.cells.edges[cell],
+        "footprint": launch.cells.edges_of(cell),
         "speckle": launch.speckle[cell],
         "jitter": launch.jitter[cell],
         "rcs": np.full(len(cell), np.nan),
