@@ -88,6 +88,16 @@ class Clock:
         times = w.adc_start_s + np.arange(w.samples) / w.sample_rate_hz
         return cls(w.carrier_hz, w.slope_hz_per_s, times, profile.frame_mid_s)
 
+    @property
+    def window_mid_s(self) -> float:
+        """Mean of the sample times [s]."""
+        return float(self.sample_s[0] + self.sample_s[-1]) / 2
+
+    @property
+    def window_mid_hz(self) -> float:
+        """Frequency at that time [Hz]."""
+        return self.carrier_hz + self.slope_hz_per_s * self.window_mid_s
+
 
 #: (clock, points, transmitter (3,), receivers (n_rx, 3), chirp starts (n,)) -> (n, n_rx, n_samples), sqrt(W)
 Field = Callable[[Clock, Points, FloatArray, FloatArray, FloatArray], ComplexArray]

@@ -1,0 +1,214 @@
+"""How a frame is cut for the NUFFT: blocks of chirps short enough that an echo's delay is nearly linear in each.
+
+Echoes are sorted into groups that share a cut and a small spread of range curvature. The choice depends on the echoes
+alone, never on the number of threads, so the order of every sum is fixed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .._typing import FloatArray, IntArray
+from ..constants import SPEED_OF_LIGHT
+from .expansion import MAX_AMPLITUDE, rank
+from .signal import Clock, Points
+
+__all__ = ["Block", "Group", "cut", "group_points"]
+
+#: Cost of a transform in nanoseconds: per point whatever the rank, per point and term, per term, per transform.
+COST_POINT, COST_SPREAD, COST_GRID, COST_SETUP = 100.0, 110.0, 1.5e6, 1.0e6
+#: Most points of one transform; bounds the memory.
+CHUNK = 1 << 17
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive chirps of a frame, and the functions of a sample that the NUFFT and its corrections use.
+
+    Parameters
+    ----------
+    clock : Clock
+    chirps : slice
+        Of the chirps handed in.
+    time : (n_chirps, n_samples) float
+        Of the samples, from the middle of the frame [s].
+    """
+
+    clock: Clock
+    chirps: slice
+    time: FloatArray
+
+    @cached_property
+    def mid_s(self) -> float:
+        """Middle of the block from the middle of the frame [s]."""
+        return float(self.time[0, 0] + self.time[-1, -1]) / 2
+
+    @cached_property
+    def half_s(self) -> float:
+        """Half of its length [s]."""
+        return float(self.time[-1, -1] - self.time[0, 0]) / 2
+
+    @cached_property
+    def fast_s(self) -> FloatArray:
+        """(n_samples,) time from the middle of the sampled window [s]."""
+        values: FloatArray = self.clock.sample_s - self.clock.window_mid_s
+        return values
+
+    @cached_property
+    def stretch(self) -> FloatArray:
+        """(n_samples,) instantaneous frequency over that at the middle of the window."""
+        values: FloatArray = 1 + self.clock.slope_hz_per_s / self.clock.window_mid_hz * self.fast_s
+        return values
+
+    @cached_property
+    def targets(self) -> tuple[FloatArray, FloatArray]:
+        """Samples flattened: fast time [s], and stretched time from the middle of the block [s]."""
+        slow = self.stretch * (self.time - self.mid_s)
+        return np.tile(self.fast_s, len(self.time)), slow.ravel()
+
+    @cached_property
+    def shapes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Functions b of the residual phases, flattened: Chebyshev orders 2, 3, 4 of time, and fast time times time."""
+        x = (self.time - self.mid_s) / self.half_s
+        square = x * x
+        powers = (2 * square - 1, (4 * square - 3) * x, 8 * square * (square - 1) + 1)
+        second, third, fourth = ((self.stretch * p).ravel() for p in powers)
+        return second, third, fourth, (self.fast_s * x / self.fast_half_s).ravel()
+
+    @property
+    def fast_half_s(self) -> float:
+        """Half of the sampled window, first to last sample [s]."""
+        return float(self.fast_s[-1])
+
+
+def cut(clock: Clock, chirp_start_s: FloatArray, count: int) -> list[Block]:
+    """Cut the chirps into ``count`` blocks of nearly equal size."""
+    edges = np.linspace(0, len(chirp_start_s), count + 1).round().astype(int)
+    time = chirp_start_s[:, None] + clock.sample_s - clock.frame_mid_s
+    return [Block(clock, slice(int(a), int(b)), time[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows of the points that share a cut into ``blocks`` blocks; 0 blocks stands for the exact sum."""
+
+    blocks: int
+    rows: IntArray
+
+
+def group_points(
+    clock: Clock, points: Points, chirp_start_s: FloatArray, array_radius_m: float, tolerance: float
+) -> list[Group]:
+    """Sort echoes into groups by the number of blocks they need and by range curvature.
+
+    Parameters
+    ----------
+    clock : Clock
+    points : Points
+    chirp_start_s : (n_chirps,) float
+    array_radius_m : float
+        Largest distance of an element from the origin; bounds hold for all elements.
+    tolerance : float
+        Largest phase that may be neglected [rad].
+
+    Returns
+    -------
+    list of Group
+        Each of at most ``CHUNK`` rows.
+    """
+    todo = np.arange(len(points))
+    bound = _Bounds.of(clock, points, chirp_start_s, array_radius_m)
+    groups: list[Group] = []
+    count = 1
+    while len(todo) and count <= len(chirp_start_s):
+        half = max(block.half_s for block in cut(clock, chirp_start_s, count))
+        curvature, neglected = bound.phases(clock, todo, half)
+        fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
+        for rows in _by_curvature(curvature[fits], tolerance):
+            groups.append(Group(count, todo[fits][rows]))
+        todo = todo[~fits]
+        count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
+    if len(todo):
+        groups.append(Group(0, todo))
+    return [Group(g.blocks, rows) for g in groups for rows in _chunks(g.rows)]
+
+
+def _chunks(rows: IntArray) -> list[IntArray]:
+    return [np.sort(part) for part in np.array_split(rows, -(-len(rows) // CHUNK))]
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """What bounds the derivatives of the range along a straight path, for every element of the array.
+
+    With d the distance of the path's line from the origin and r the least range of the path, r'' = V^2 d^2 / r^3 is at
+    most ``curvature``; the n-th derivative over n! falls like (V / r)^n, the series of a hyperbola.
+    """
+
+    curvature: FloatArray
+    speed: FloatArray
+    least: FloatArray
+    farthest: FloatArray
+
+    @classmethod
+    def of(cls, clock: Clock, points: Points, chirp_start_s: FloatArray, radius: float) -> _Bounds:
+        first = chirp_start_s.min() + clock.sample_s[0] - clock.frame_mid_s
+        last = chirp_start_s.max() + clock.sample_s[-1] - clock.frame_mid_s
+        p, v = points.position, points.velocity
+        square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
+        range_square = np.einsum("qi,qi->q", p, p)
+        speed = np.sqrt(square)
+        safe = np.where(square > 0, square, 1.0)
+        line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
+        closest = np.clip(-along / safe, first, last)
+        least = np.sqrt(np.maximum(range_square + (2 * along + square * closest) * closest, 0.0)) - radius
+        farthest = np.sqrt(range_square) + speed * max(abs(first), abs(last)) + radius
+        with np.errstate(divide="ignore"):
+            inverse = np.where(least > 0, 1 / np.maximum(least, 1e-300), np.inf)
+        lever = np.minimum((line + radius) * inverse, 1.0)
+        curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
+        return cls(curvature, speed, np.maximum(least, 1e-9), farthest)
+
+    def phases(self, clock: Clock, rows: IntArray, half: float) -> tuple[FloatArray, FloatArray]:
+        """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
+        curvature = np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * self.curvature[rows] * half**2
+        ratio = self.speed[rows] * half / self.least[rows]
+        # fifth order and beyond: the leading Chebyshev coefficient of x^5 is 1/16
+        series = np.where(ratio < 0.5, curvature * ratio**3 / 8, np.inf)
+        # the quadratic delay term -k tau^2 / 2 beyond what moves into frequency, curvature and the fast x slow term
+        chirpiness = clock.slope_hz_per_s / clock.window_mid_hz
+        moved = 2 * self.speed[rows] * half / SPEED_OF_LIGHT
+        fast = chirpiness * float(np.ptp(clock.sample_s)) / 2
+        cross = chirpiness * (2 * self.farthest[rows] / SPEED_OF_LIGHT * fast + moved) * curvature
+        late = np.pi / 2 * clock.slope_hz_per_s * moved**2 * fast
+        return curvature, series + cross + late
+
+
+def _by_curvature(phase: FloatArray, tolerance: float) -> list[IntArray]:
+    """Cut sorted curvature phases into groups of small spread where that saves transforms.
+
+    Dynamic programming over a fixed set of edges with the measured costs above.
+    """
+    if not len(phase):
+        return []
+    order = np.argsort(phase, kind="stable")
+    ordered = phase[order]
+    steps = np.unique(np.concatenate([[0.0], np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
+    at = np.unique(np.concatenate([[0], np.searchsorted(ordered, steps[1:], side="right"), [len(ordered)]]))
+    best, back = [0.0], [0]
+    for j in range(1, len(at)):
+        costs = []
+        for i in range(j):
+            terms = rank((ordered[at[j] - 1] - ordered[at[i]]) / 2, tolerance)
+            size = int(at[j] - at[i])
+            costs.append(best[i] + COST_SETUP + COST_GRID * terms + size * (COST_POINT + COST_SPREAD * terms))
+        back.append(int(np.argmin(costs)))
+        best.append(min(costs))
+    groups, j = [], len(at) - 1
+    while j > 0:
+        groups.append(order[at[back[j]] : at[j]])
+        j = back[j]
+    return groups[::-1]
