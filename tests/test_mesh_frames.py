@@ -11,7 +11,8 @@ from shenron_rt.scene.mesh_frames import MESH_FRAMES, UNITS, mesh_matrix
 
 POINT_UE_M = np.array([11.0, 5.0, 2.0])  # 11 m ahead, 5 m to the RIGHT, 2 m up in Unreal's left-handed frame
 
-# How each writer lays out Unreal's X, Y, Z in its columns (CarlaExporter.cpp, GLTFCoreUtilities, FbxDataConverter, Mesh.cpp)
+# How each writer lays out Unreal's X, Y, Z in its columns: CarlaExporter.cpp, StaticMeshExporterOBJ, GLTFCoreUtilities,
+# FbxDataConverter, LibCarla Mesh.cpp
 WRITERS = {
     "carla_exporter": lambda p: p[[0, 2, 1]],
     "ue_obj_cm": lambda p: 100.0 * p[[0, 2, 1]],

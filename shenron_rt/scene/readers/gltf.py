@@ -95,10 +95,14 @@ class _Walker:
         self._parts: list[Part] = []
         self._n_vertices = 0
         self._skipped = 0
+        self._seen: set[int] = set()
 
     def visit(self, index: int, parent: FloatArray, group: str, extras: dict[str, Any] | None, depth: int) -> None:
         if depth > _MAX_DEPTH:
-            raise InputError(f"{self._file}: nodes are nested deeper than {_MAX_DEPTH} (a cycle?)")
+            raise InputError(f"{self._file}: nodes are nested deeper than {_MAX_DEPTH}")
+        if index in self._seen:
+            raise InputError(f"{self._file}: node {index} has two parents or is its own; glTF nodes form a tree")
+        self._seen.add(index)
         node = self._doc["nodes"][index]
         world = parent @ _local_matrix(node)
         merged = {**(extras or {}), **_extras(node)}
