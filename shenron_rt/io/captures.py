@@ -251,7 +251,7 @@ def _unpack(words: NDArray[np.int16], rx: int, samples: int, parts: int, layout:
         split = np.moveaxis(pairs, 4, 0).reshape(2, *lead, rx, samples)
     else:
         split = words.reshape(1, *lead, rx, samples).astype(np.float64)
-    return split[0] + 1j * (split[1] if parts == 2 else 0.0)
+    return np.asarray(split[0] + 1j * (split[1] if parts == 2 else 0.0), dtype=np.complex128)
 
 
 def _pack(chirps: ComplexArray, parts: int, layout: Layout) -> FloatArray:

@@ -1,0 +1,330 @@
+"""Run folders: written whole beside their place and moved into it, so that a reader never sees half a run.
+
+::
+
+    config.yaml     the resolved scene, profiles included; can be run again
+    summary.json    strongest return and every object, frame by frame
+    manifest.json   size and SHA-256 of every other file
+    radars/<name>/frame_000000/{scatterers,returns,adc,cube}.npz, detections.csv, *.png
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import itertools
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from .errors import InputError, NotFoundError
+
+if TYPE_CHECKING:
+    from .dsp import Detections, RadarCube
+    from .returns import Returns
+    from .synthesis.adc import AdcCube
+
+__all__ = [
+    "FrameLike", "Run", "default_folder", "frame_folder", "frame_summary", "load_run", "objects_summary",
+    "strongest_summary", "verify_manifest", "write_frame", "write_json", "write_manifest", "write_run",
+]  # fmt: skip
+
+_MANIFEST = "manifest.json"
+
+
+class FrameLike(Protocol):
+    """What a run folder needs of a frame: :class:`shenron_rt.Frame`, or a processed capture."""
+
+    @property
+    def adc(self) -> AdcCube: ...  # noqa: D102
+    @property
+    def cube(self) -> RadarCube: ...  # noqa: D102
+    @property
+    def detections(self) -> Detections: ...  # noqa: D102
+    @property
+    def frame(self) -> int: ...  # noqa: D102
+    @property
+    def time(self) -> float: ...  # noqa: D102
+
+
+# ---- where
+def default_folder(stem: str, profile: str, parent: Path = Path("out")) -> Path:
+    """Return the first of ``parent/stem-profile``, ``-2``, ``-3`` ... that does not exist."""
+    base = parent / f"{stem}-{profile}"
+    for number in itertools.count(2):
+        if not base.exists():
+            return base
+        base = parent / f"{stem}-{profile}-{number}"
+    raise AssertionError("unreachable")
+
+
+def check_target(folder: Path, overwrite: bool) -> None:
+    """Refuse an output folder that holds something which may not be replaced.
+
+    Raises
+    ------
+    InputError
+        A file of that name; a folder with content and no ``overwrite``; with it, a folder that is no run.
+    """
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f"-o {folder}: is a file; give a folder")
+    if not any(folder.iterdir()):
+        return
+    if not overwrite:
+        raise InputError(
+            f"-o {folder}: the folder is not empty; give another one, or --overwrite to replace the run in it"
+        )
+    if not (folder / _MANIFEST).is_file():
+        raise InputError(
+            f"-o {folder}: --overwrite replaces runs only, and the folder has no {_MANIFEST}; give another"
+        )
+
+
+@contextlib.contextmanager
+def write_run(folder: Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Give a temporary folder to fill, and move it to ``folder`` when the ``with`` block ends without an error.
+
+    Parameters
+    ----------
+    folder : path
+        Where the run shall stand. What stands there stays as it is until the new run is complete.
+    overwrite : bool
+        Replace a run that is there.
+
+    Raises
+    ------
+    InputError
+        The place is taken; raised before anything is written.
+    """
+    check_target(folder, overwrite)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.partial-"))
+    try:
+        umask = os.umask(0)
+        os.umask(umask)
+        partial.chmod(0o777 & ~umask)  # mkdtemp gives 0700, which others on the team could not read
+        yield partial
+        write_manifest(partial)
+        _move_into_place(partial, folder, overwrite)
+    finally:
+        if partial.exists():
+            shutil.rmtree(partial, ignore_errors=True)
+
+
+def _move_into_place(partial: Path, folder: Path, overwrite: bool) -> None:
+    check_target(folder, overwrite)  # another run may have ended here meanwhile
+    if not folder.exists() or not any(folder.iterdir()):
+        partial.replace(folder)
+        return
+    aside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old-"))
+    folder.replace(aside)
+    try:
+        partial.replace(folder)
+    except BaseException:
+        aside.replace(folder)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+# ---- what
+def frame_folder(root: Path, radar: str, frame: int) -> Path:
+    """Return ``root/radars/<radar>/frame_000000``."""
+    return root / "radars" / radar / f"frame_{frame:06d}"
+
+
+def write_frame(folder: Path, frame: FrameLike) -> None:
+    """Write the arrays and the detections of one frame; keys are the attribute names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("scatterers", "returns", "adc", "cube"):
+        stage = getattr(frame, name, None)
+        if stage is not None:
+            stage.save(folder / f"{name}.npz")
+    frame.detections.to_csv(folder / "detections.csv")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON; numbers that are not finite become null, which JSON has no other word for."""
+    path.write_text(json.dumps(plain(value), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def plain(value: Any) -> Any:
+    """Return a value made of JSON's types only."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def strongest_summary(detections: Detections) -> dict[str, Any] | None:
+    """Return the strongest detection with the keys of ``summary.json``; None where nothing was detected."""
+    if len(detections) == 0:
+        return None
+    row = detections.table[0]
+    return {
+        "range_m": float(row["range"]),
+        "azimuth_deg": math.degrees(float(row["azimuth"])),
+        "velocity_mps": float(row["velocity"]),
+        "snr_db": float(row["snr_db"]),
+        "object_id": int(row["object_id"]),
+    }
+
+
+def objects_summary(
+    returns: Returns, cube: RadarCube, detections: Detections, names: Mapping[int, str] | None = None
+) -> list[dict[str, Any]]:
+    """Return one record an object: id, tag, power_dbw, snr_db, detected, name; by falling power.
+
+    Parameters
+    ----------
+    returns, cube, detections
+        Of one frame.
+    names : mapping of int to str, optional
+        Objects of the scene; those without a return are listed with a null power.
+
+    Notes
+    -----
+    ``snr_db`` is that of a point with the object's whole power on the centre of its cells:
+    P n_channels / (k T0 F f_s ENBW / n_samples / n_loops). An object wider than a cell stands lower than this.
+    """
+    from .tags import SemanticTag
+
+    power = returns.power_by_object()
+    noise = cube.noise_power_w / cube.profile.n_virtual
+    seen = {int(i) for i in np.unique(detections.object_id)}
+    ids, first = np.unique(returns.object_id, return_index=True)
+    tags = dict(zip((int(i) for i in ids), (int(t) for t in returns.tag[first]), strict=True))
+    records = []
+    for number in sorted(set(power) | set(names or {}), key=lambda i: -power.get(i, -1.0)):
+        watts = power.get(number, 0.0)
+        if watts == 0 and number == 0:
+            continue  # a scene without static parts
+        level = 10 * math.log10(watts) if watts > 0 else None
+        records.append(
+            {
+                "id": number,
+                "name": (names or {}).get(number, f"object {number}"),
+                "tag": SemanticTag(tags[number]).name if number in tags else None,
+                "power_dbw": level,
+                "snr_db": None if level is None else level - 10 * math.log10(noise),
+                "detected": number in seen,
+            }
+        )
+    return records
+
+
+def frame_summary(frame: FrameLike, names: Mapping[int, str] | None = None) -> dict[str, Any]:
+    """Return the record of one frame in ``summary.json``."""
+    returns = getattr(frame, "returns", None)
+    return {
+        "frame": frame.frame,
+        "time_s": frame.time,
+        "detections": len(frame.detections),
+        "strongest": strongest_summary(frame.detections),
+        "objects": [] if returns is None else objects_summary(returns, frame.cube, frame.detections, names),
+    }
+
+
+# ---- the manifest
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_manifest(root: Path) -> None:
+    """Write size and SHA-256 of every file below ``root``."""
+    files = sorted(p for p in root.rglob("*") if p.is_file() and p != root / _MANIFEST)
+    records = {p.relative_to(root).as_posix(): {"size": p.stat().st_size, "sha256": _sha256(p)} for p in files}
+    write_json(root / _MANIFEST, {"version": 1, "files": records})
+
+
+def verify_manifest(root: Path) -> list[str]:
+    """Return what differs from ``manifest.json``: files missing or changed, one phrase each."""
+    try:
+        manifest = json.loads((root / _MANIFEST).read_text(encoding="utf-8"))
+        listed = manifest["files"].items()
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotFoundError(f"{root}: not a run folder, it has no {_MANIFEST}") from None
+    except (ValueError, KeyError, AttributeError, TypeError):
+        raise InputError(f"{root / _MANIFEST}: not a manifest of a run") from None
+    problems = []
+    for name, record in listed:
+        file = root / name
+        if not file.is_file():
+            problems.append(f"{name}: missing")
+        elif file.stat().st_size != record["size"] or _sha256(file) != record["sha256"]:
+            problems.append(f"{name}: changed since the run")
+    return problems
+
+
+# ---- reading
+@dataclass(frozen=True)
+class Run:
+    """A run folder that was read.
+
+    Parameters
+    ----------
+    root : Path
+    summary : dict
+        ``summary.json``.
+    frames : dict of str to list of Path
+        The folder of every frame, by radar name.
+    """
+
+    root: Path
+    summary: dict[str, Any]
+    frames: dict[str, list[Path]] = field(repr=False)
+
+    @property
+    def radars(self) -> list[str]:
+        """Names of the radars, in the order of the summary."""
+        return list(self.frames)
+
+    @property
+    def config(self) -> Path:
+        """``config.yaml``."""
+        return self.root / "config.yaml"
+
+
+def load_run(path: str | os.PathLike[str]) -> Run:
+    """Read a run folder.
+
+    Raises
+    ------
+    NotFoundError
+        No such folder, or not a run.
+    InputError
+        The summary cannot be read, or a frame it lists is missing.
+    """
+    root = Path(path)
+    try:
+        summary = json.loads((root / "summary.json").read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotFoundError(f"{root}: not a run folder, it has no summary.json") from None
+    except ValueError as error:
+        raise InputError(f"{root / 'summary.json'}: not valid JSON ({error})") from None
+    frames = {
+        r["name"]: [frame_folder(root, r["name"], f["frame"]) for f in r["frames"]] for r in summary.get("radars", [])
+    }
+    missing = [str(f) for folders in frames.values() for f in folders if not f.is_dir()]
+    if missing:
+        raise InputError(f"{root}: frame folders listed in summary.json are missing: {missing[0]}")
+    return Run(root, summary, frames)
