@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
-from ._typing import ArrayLike, ComplexArray, FloatArray, IntArray
+from ._typing import ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from .errors import InputError
 from .io.npz import load_npz, save_npz
 
@@ -65,6 +65,8 @@ class Scatterers:
         Names in the material table.
     footprint : (n, 2, 3) float or None
         Half edges e_u, e_v of the ray's cell: its corners are the directions d +- e_u +- e_v, d = position / range.
+    joined : (n, 4) bool or None
+        Whether the surface goes on in the same plane across the cell's edges towards -v, +u, +v, -u.
     speckle : (n,) complex or None
         Unit-power circular Gaussian number of the row, drawn by the tracer from the frame's seed.
     jitter : (n, 2) float or None
@@ -100,6 +102,7 @@ class Scatterers:
     material: IntArray | None = None
     material_names: tuple[str, ...] = ()
     footprint: FloatArray | None = None
+    joined: BoolArray | None = None
     speckle: ComplexArray | None = None
     jitter: FloatArray | None = None
     rcs: FloatArray | None = None
@@ -116,7 +119,7 @@ class Scatterers:
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "range_rate": (n,), "cos_incidence": (n,), "object_id": (n,), "tag": (n,),
             "area": (n,), "velocity": (n, 3), "normal": (n, 3), "material": (n,), "footprint": (n, 2, 3),
-            "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
+            "joined": (n, 4), "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)

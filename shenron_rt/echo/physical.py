@@ -148,7 +148,8 @@ def _coherent(
     u = position[keep] / distance[keep, None]
     normal = scatterers.normal[rows[keep]]
     gamma = backscatter_reflection(curves.te[keep], curves.tm[keep], normal, u, profile.antenna.polarization)
-    integral = tube_integral(u, scatterers.footprint[rows[keep]], normal, distance[keep], wavenumber)
+    joined = None if scatterers.joined is None else scatterers.joined[rows[keep]]
+    integral = tube_integral(u, scatterers.footprint[rows[keep]], normal, distance[keep], wavenumber, joined)
     # The one conjugation from e^{+jwt} echo phasors to the de-chirped signal conj(rx) tx.
     amplitude = np.conj(scale[keep] * gamma * integral)
     strong = np.abs(amplitude) ** 2 > _NEGLIGIBLE * speckle[keep]

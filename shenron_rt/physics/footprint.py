@@ -17,16 +17,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._typing import BoolArray, ComplexArray, FloatArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["tube_integral"]
 
 #: Phase across half a cell below which it counts as nearly stationary [rad].
 _STATIONARY = 16.0
+#: Phase across half a cell above which neither cell of an edge can be stationary: from one cell to the next it changes
+#: by the quadratic part only, which stays below 10 rad where the phase is nearly stationary.
+_SETTLED = 48.0
 
 
 def tube_integral(
-    direction: FloatArray, edges: FloatArray, normal: FloatArray, distance: FloatArray, wavenumber: float
+    direction: FloatArray,
+    edges: FloatArray,
+    normal: FloatArray,
+    distance: FloatArray,
+    wavenumber: float,
+    joined: BoolArray | None = None,
 ) -> ComplexArray:
     """Integrate exp(-2jk(r - r_c)) over the solid angle of cells that hit planes.
 
@@ -42,6 +50,10 @@ def tube_integral(
         From the radar to the hit point r_c along ``direction`` [m].
     wavenumber : float
         k = 2 pi / lambda [rad/m].
+    joined : (n, 4) bool, optional
+        Edges (towards -v, +u, +v, -u) across which a neighbouring cell goes on in the same plane. Far from the
+        stationary point they are left out, because the neighbour has the same with the other sign: the sum over the
+        surface stays the same, and most cells of a flat surface give exactly zero.
 
     Returns
     -------
@@ -60,98 +72,126 @@ def tube_integral(
     .. [2] J. S. Asvestas, "The physical optics integral and computer graphics", IEEE Trans. Antennas Propag. 43(12),
        1995.
     """
-    geometry = _Geometry(direction, edges, normal)
-    corner_phase = geometry.phase_at_corners(distance, wavenumber)
-    across_u = np.abs(corner_phase[1] + corner_phase[2] - corner_phase[0] - corner_phase[3]) / 4
-    across_v = np.abs(corner_phase[2] + corner_phase[3] - corner_phase[0] - corner_phase[1]) / 4
-    # A corner beyond the horizon of the plane has no phase: the contour does not exist, and nothing comes back.
-    whole = np.all(geometry.cosine > 0, axis=0)
-    stationary = np.hypot(across_u, across_v) < _STATIONARY
     result = np.zeros(len(distance), dtype=np.complex128)
+    rows = np.arange(len(distance))
+    if joined is not None:
+        rows = np.flatnonzero(~_surely_zero(direction, edges, normal, distance, wavenumber, joined))
+        direction, edges, normal = direction[rows], edges[rows], normal[rows]
+        distance, joined = distance[rows], joined[rows]
+    corners = _Corners(direction, edges, normal, distance, wavenumber)
+    phase = corners.phase
+    across_u = (phase[1] + phase[2] - phase[0] - phase[3]) / 4
+    across_v = (phase[2] + phase[3] - phase[0] - phase[1]) / 4
+    # A corner beyond the horizon of the plane has no phase: the contour does not exist, and nothing comes back.
+    whole = np.all(corners.cosine > 0, axis=0)
+    stationary = across_u**2 + across_v**2 < _STATIONARY**2
     far = np.flatnonzero(whole & ~stationary)
-    result[far] = _contour(geometry.rows(far), corner_phase[:, far], distance[far], wavenumber)
+    result[rows[far]] = _contour(corners, far, distance[far], wavenumber, None if joined is None else joined[far])
     near = np.flatnonzero(whole & stationary)
-    result[near] = _separable(direction[near], edges[near], normal[near], distance[near], wavenumber)
+    result[rows[near]] = _separable(direction[near], edges[near], normal[near], distance[near], wavenumber)
     return result
 
 
-class _Geometry:
-    """Dot products of the four corner directions, in the order (-,-), (+,-), (+,+), (-,+) of (u, v)."""
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
-    _U = np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
-    _V = np.array([-1.0, -1.0, 1.0, 1.0])[:, None]
 
-    def __init__(self, direction: FloatArray, edges: FloatArray, normal: FloatArray) -> None:
-        along = np.einsum("ij,ij->i", normal, direction)
-        side = np.where(along < 0, -1.0, 1.0)
+def _triple(a: FloatArray, b: FloatArray, n: FloatArray) -> FloatArray:
+    """Return (a x b) . n."""
+    x = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    y = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    z = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return x * n[:, 0] + y * n[:, 1] + z * n[:, 2]
+
+
+def _surely_zero(
+    direction: FloatArray,
+    edges: FloatArray,
+    normal: FloatArray,
+    distance: FloatArray,
+    wavenumber: float,
+    joined: BoolArray,
+) -> BoolArray:
+    """Return which cells have neighbours all around and every edge far beyond ``_SETTLED``."""
+    cos = np.abs(_dot(direction, normal))
+    half = np.sqrt(np.minimum(_dot(edges[:, 0], edges[:, 0]), _dot(edges[:, 1], edges[:, 1])))
+    slope = 2.0 * wavenumber * distance * np.sqrt(np.maximum(1.0 - cos**2, 0.0)) * half
+    # three times: from the centre of a cell to its edge the measure changes by less than that
+    zero: BoolArray = joined.all(axis=1) & (slope > 3.0 * _SETTLED * cos)
+    return zero
+
+
+class _Corners:
+    """The four corner directions w of each cell, in the order (-,-), (+,-), (+,+), (-,+) of (u, v).
+
+    ``cosine`` is m . w and ``square`` is w . w, both (4, n), for w not of unit length; ``phase`` is 2k(r - r_c) [rad];
+    ``turn`` is m . (w_i x w_i+1) of the edges, ``length2`` (2, n) the squared length of those along u and v.
+    """
+
+    def __init__(
+        self, direction: FloatArray, edges: FloatArray, normal: FloatArray, distance: FloatArray, wavenumber: float
+    ) -> None:
+        along = _dot(normal, direction)
+        away = np.where(along < 0, -1.0, 1.0)[:, None] * normal
         e_u, e_v = edges[:, 0], edges[:, 1]
-        self.center_cosine = np.abs(along)
-        nu = np.einsum("ij,ij->i", normal, e_u) * side
-        nv = np.einsum("ij,ij->i", normal, e_v) * side
-        #: (4, n) m . w of the corner directions w, which are not of unit length
-        self.cosine = self.center_cosine + self._U * nu + self._V * nv
-        du = np.einsum("ij,ij->i", direction, e_u)
-        dv = np.einsum("ij,ij->i", direction, e_v)
-        uv = np.einsum("ij,ij->i", e_u, e_v)
-        uu = np.einsum("ij,ij->i", e_u, e_u)
-        vv = np.einsum("ij,ij->i", e_v, e_v)
-        #: (4, n) |w|^2
-        self.square = 1.0 + uu + vv + 2.0 * (self._U * du + self._V * dv + self._U * self._V * uv)
-        # m . (w_i x w_i+1) of the four edges, from three triple products
-        cross_u = np.einsum("ij,ij->i", np.cross(direction, e_u), normal) * side
-        cross_v = np.einsum("ij,ij->i", np.cross(direction, e_v), normal) * side
-        cross_uv = np.einsum("ij,ij->i", np.cross(e_u, e_v), normal) * side
+        center = np.abs(along)
+        nu, nv = _dot(away, e_u), _dot(away, e_v)
+        du, dv = 2.0 * _dot(direction, e_u), 2.0 * _dot(direction, e_v)
+        uv = 2.0 * _dot(e_u, e_v)
+        uu, vv = _dot(e_u, e_u), _dot(e_v, e_v)
+        sides = 1.0 + uu + vv
+        self.length2 = 4.0 * np.stack([uu, vv])
+        self.cosine = np.stack([center - nu - nv, center + nu - nv, center + nu + nv, center - nu + nv])
+        self.square = np.stack([sides - du - dv + uv, sides + du - dv - uv, sides + du + dv + uv, sides - du + dv - uv])
+        cross_u, cross_v = _triple(direction, e_u, away), _triple(direction, e_v, away)
+        cross_uv = _triple(e_u, e_v, away)
         self.turn = 2.0 * np.stack([cross_u + cross_uv, cross_v + cross_uv, cross_uv - cross_u, cross_uv - cross_v])
-
-    def rows(self, index: np.ndarray) -> _Geometry:  # type: ignore[type-arg]
-        """Return the same for some of the cells."""
-        picked = object.__new__(_Geometry)
-        picked.center_cosine = self.center_cosine[index]
-        picked.cosine, picked.square, picked.turn = (a[:, index] for a in (self.cosine, self.square, self.turn))
-        return picked
-
-    def phase_at_corners(self, distance: FloatArray, wavenumber: float) -> FloatArray:
-        """Return (4, n) 2k(r - r_c) [rad]."""
+        self.height = distance * center
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach = np.sqrt(self.square) * self.center_cosine / self.cosine
-        phase: FloatArray = 2.0 * wavenumber * distance * (reach - 1.0)
-        return phase
+            self.phase = 2.0 * wavenumber * (self.height * np.sqrt(self.square) / self.cosine - distance)
 
 
-def _contour(geometry: _Geometry, phase: FloatArray, distance: FloatArray, wavenumber: float) -> ComplexArray:
-    # c = cosine of the corner from the normal, t = |tangential part of w|
-    root = np.sqrt(geometry.square)
-    c = geometry.cosine / root
-    tangential = np.sqrt(np.maximum(geometry.square - geometry.cosine**2, 1e-300))
+def _contour(
+    corners: _Corners, rows: IntArray, distance: FloatArray, wavenumber: float, joined: BoolArray | None
+) -> ComplexArray:
+    square, cosine, phase = corners.square[:, rows], corners.cosine[:, rows], corners.phase[:, rows]
+    turn, height = corners.turn[:, rows], corners.height[rows]
+    c = cosine / np.sqrt(square)
+    tangential = np.sqrt(np.maximum(square - cosine**2, 1e-300))
     phasor = np.exp(-1j * phase)
+    length2 = corners.length2[:, rows]
+    settled = (_SETTLED / (wavenumber * height)) ** 2
     total = np.zeros(len(distance), dtype=np.complex128)
     for i in range(4):
         j = (i + 1) % 4
-        d_psi = geometry.turn[i] / (tangential[i] * tangential[j])
         step = phase[j] - phase[i]
         flat = np.abs(step) < 1e-4
         mean = (phasor[i] - phasor[j]) / (1j * np.where(flat, 1.0, step))
         mean = np.where(flat, 0.5 * (phasor[i] + phasor[j]), mean)
-        total += c[i] * c[j] * d_psi * mean
-    height = distance * geometry.center_cosine
+        weight = c[i] * c[j] * turn[i] / (tangential[i] * tangential[j])
+        if joined is not None:
+            # Phase across half a cell at the edge, k r tan(theta) times the edge's angle, from what both of its
+            # cells see alike whatever the length of their direction vectors.
+            square_slope = length2[i % 2] * tangential[i] * tangential[j] / (cosine[i] * cosine[j]) ** 2
+            weight = np.where(joined[:, i] & (square_slope > settled), 0.0, weight)
+        total += weight * mean
     return 1j / (2.0 * wavenumber * height) * total
 
 
 def _separable(
     direction: FloatArray, edges: FloatArray, normal: FloatArray, distance: FloatArray, wavenumber: float
 ) -> ComplexArray:
-    along = np.einsum("ij,ij->i", normal, direction)
+    along = _dot(normal, direction)
     result = np.ones(len(distance), dtype=np.complex128)
     for axis in range(2):
         e = edges[:, axis]
-        half = np.einsum("ij,ij->i", normal, e)
-        square = 1.0 + np.einsum("ij,ij->i", e, e)
-        shift = 2.0 * np.einsum("ij,ij->i", direction, e)
+        half = _dot(normal, e)
+        square = 1.0 + _dot(e, e)
+        shift = 2.0 * _dot(direction, e)
         ends = [np.sqrt(square + s * shift) * along / (along + s * half) - 1.0 for s in (1.0, -1.0)]
         plus, minus = (2.0 * wavenumber * distance * end for end in ends)
         result *= _quadratic_phase((plus - minus) / 2, (plus + minus) / 2)
-    solid = np.einsum("ij,ij->i", np.cross(edges[:, 0], edges[:, 1]), direction)
-    return result * np.abs(solid)
+    return result * np.abs(_triple(edges[:, 0], edges[:, 1], direction))
 
 
 def _quadratic_phase(linear: FloatArray, quadratic: FloatArray) -> ComplexArray:

@@ -35,6 +35,8 @@ class Body:
     tag : (f,) uint8
     material : (f,) uint16
         Index into the material names of the world.
+    plane : (f,) int32
+        Equal for faces of one plane and one material.
     """
 
     object_id: int
@@ -42,6 +44,7 @@ class Body:
     mesh: TaggedMesh
     tag: IntArray
     material: IntArray
+    plane: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +63,8 @@ class World:
     face_body : (f,) int32
     face_tag : (f,) uint8
     face_material : (f,) uint16
+    face_plane : (f,) int32
+        Equal for coplanar faces of one body and one material.
     bodies : tuple of Body
     vertex_start : (b + 1,) int64
         Where each body's vertices begin.
@@ -79,6 +84,7 @@ class World:
     face_body: IntArray
     face_tag: IntArray
     face_material: IntArray
+    face_plane: IntArray
     bodies: tuple[Body, ...]
     vertex_start: IntArray
     drift: FloatArray
@@ -167,7 +173,21 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
     if not keep.all():
         mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
     object_id = int(getattr(entry, "id", 0))
-    return Body(object_id, entry, mesh, face_tag[keep], index[mesh.part])
+    material = index[mesh.part]
+    return Body(object_id, entry, mesh, face_tag[keep], material, _planes(mesh, material))
+
+
+def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
+    """Return (f,) int32, equal for faces that lie in one plane (to a micrometre) and are of one material."""
+    normal = mesh.face_normal
+    # either side of a plane is the same plane: make the largest component positive
+    largest = np.take_along_axis(normal, np.abs(normal).argmax(axis=1)[:, None], axis=1)
+    normal = normal * np.where(largest < 0, -1.0, 1.0)
+    offset = np.einsum("ij,ij->i", normal, mesh.vertices[mesh.faces[:, 0]])
+    key = np.column_stack([np.round(normal * 1e7), np.round(offset * 1e6), material.astype(np.float64)]).astype(np.int64)
+    rows = np.ascontiguousarray(key).view(np.dtype((np.void, key.dtype.itemsize * key.shape[1])))
+    _, plane = np.unique(rows.ravel(), return_inverse=True)
+    return plane.astype(np.int32)
 
 
 def build_world(
@@ -205,6 +225,8 @@ def build_world(
     counts = [len(b.mesh.faces) for b in bodies]
     start = np.concatenate([[0], np.cumsum([len(v) for v in vertices])]).astype(np.int64)
     faces = [b.mesh.faces + int(s) for b, s in zip(bodies, start[:-1], strict=True)]
+    first_plane = np.cumsum([0, *(int(b.plane.max(initial=-1)) + 1 for b in bodies)])
+    planes = [b.plane + k for b, k in zip(bodies, first_plane[:-1], strict=True)]
     points = _stack(vertices, (0, 3), np.float64)
     triangles = _stack(faces, (0, 3), np.int32)
     normal = _stack(normals, (0, 3), np.float64)
@@ -216,6 +238,7 @@ def build_world(
         face_body=np.repeat(np.arange(len(bodies), dtype=np.int32), counts),
         face_tag=_stack([b.tag for b in bodies], (0,), np.uint8),
         face_material=_stack([b.material for b in bodies], (0,), np.uint16),
+        face_plane=_stack(planes, (0,), np.int32),
         bodies=bodies,
         vertex_start=start,
         drift=_stack([d[None] for d in drift], (0, 3), np.float64),

@@ -35,6 +35,8 @@ class Cells:
         [sr].
     spacing : float
         Angle between neighbours [rad].
+    neighbour : (n, 4) int32
+        The cells across the edges towards -v, +u, +v, -u; -1 at the rim of a patch.
     turn : (3, 3) float or None
         Rotation still to be applied to ``edges``; directions have had it. Most cells hit nothing.
     """
@@ -43,6 +45,7 @@ class Cells:
     edges: FloatArray
     solid_angle: FloatArray
     spacing: float
+    neighbour: IntArray
     turn: FloatArray | None = None
 
     def __len__(self) -> int:
@@ -70,7 +73,15 @@ def _patch(axes: FloatArray, x_edges: FloatArray, y_edges: FloatArray, spacing: 
         x_edges[:, None] * y_edges[None], np.sqrt(1 + x_edges[:, None] ** 2 + y_edges[None] ** 2)
     )
     solid = (corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]).ravel()
-    return Cells(local @ axes, (edges.reshape(-1, 3) @ axes).reshape(-1, 2, 3), solid, spacing)
+    turned_edges = (edges.reshape(-1, 3) @ axes).reshape(-1, 2, 3)
+    return Cells(local @ axes, turned_edges, solid, spacing, _grid_neighbours(len(x), len(y)))
+
+
+def _grid_neighbours(nx: int, ny: int) -> IntArray:
+    index = np.full((nx + 2, ny + 2), -1, dtype=np.int32)
+    index[1:-1, 1:-1] = np.arange(nx * ny, dtype=np.int32).reshape(nx, ny)
+    across = (index[1:-1, :-2], index[2:, 1:-1], index[1:-1, 2:], index[:-2, 1:-1])
+    return np.stack([a.ravel() for a in across], axis=1)
 
 
 # Faces of the cube: outward normal and two tangents, right-handed seen from outside.
@@ -91,11 +102,13 @@ def _cube(cells_per_edge: int) -> Cells:
     edges = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells_per_edge + 1))
     spacing = np.pi / 2 / cells_per_edge
     faces = [_patch(axes, edges, edges, spacing) for axes in _CUBE]
+    first = np.arange(len(faces), dtype=np.int32) * cells_per_edge**2
     return Cells(
         np.concatenate([f.direction for f in faces]),
         np.concatenate([f.edges for f in faces]),
         np.concatenate([f.solid_angle for f in faces]),
         spacing,
+        np.concatenate([np.where(f.neighbour < 0, -1, f.neighbour + k) for f, k in zip(faces, first, strict=True)]),
     )
 
 
@@ -121,7 +134,10 @@ def pattern_cells(pattern: AntennaPattern, rays: int) -> Cells:
     share = float(coarse.solid_angle[_lit(coarse, pattern, coarse.spacing)].sum() / (4 * np.pi))
     cells = _cube(max(4, round(np.sqrt(rays / (6 * share)))))
     keep = _lit(cells, pattern, cells.spacing)
-    return Cells(cells.direction[keep], cells.edges[keep], cells.solid_angle[keep], cells.spacing)
+    row = np.full(len(cells) + 1, -1, dtype=np.int32)  # the last entry answers for -1
+    row[:-1][keep] = np.arange(keep.sum(), dtype=np.int32)
+    neighbour = row[cells.neighbour[keep]]
+    return Cells(cells.direction[keep], cells.edges[keep], cells.solid_angle[keep], cells.spacing, neighbour)
 
 
 def turned(cells: Cells, shift: FloatArray) -> Cells:
@@ -135,7 +151,7 @@ def turned(cells: Cells, shift: FloatArray) -> Cells:
     """
     yaw, pitch = np.degrees(np.asarray(shift) * cells.spacing)
     R = rotation_matrix((yaw, pitch, 0.0))
-    return Cells(cells.direction @ R.T, cells.edges, cells.solid_angle, cells.spacing, R)
+    return Cells(cells.direction @ R.T, cells.edges, cells.solid_angle, cells.spacing, cells.neighbour, R)
 
 
 def aimed_cells(points: FloatArray, rays: int, shift: FloatArray) -> Cells | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray, IntArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from ..config.profile import RadarProfile
 from ..config.scene import RadarMount, Scene
 from ..errors import InputError
@@ -102,7 +102,7 @@ def trace(
     own = np.isin(world.face_body, list(aimed))
     hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
     hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
-    rows = [_rows(world, launch, p[h], h) for launch, p, h in zip(launches, parts, hits, strict=True)]
+    rows = [_rows(world, launch, p, h) for launch, p, h in zip(launches, parts, hits, strict=True)]
     rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s, run_seed, frame, mount.name))
     columns = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     return Scatterers(
@@ -173,8 +173,9 @@ def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> _Launch 
     return None if cells is None else _draw(cells, generator)
 
 
-def _rows(world: World, launch: _Launch, face: IntArray, cell: IntArray) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
-    """Return the columns of one row for each hit: ``cell`` hits ``face``."""
+def _rows(world: World, launch: _Launch, hit: IntArray, cell: IntArray) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
+    """Return the columns of one row for each of the cells ``cell``; ``hit`` is the face each cell of the launch hits."""
+    face = hit[cell]
     d = launch.cells.direction[cell]
     normal = world.face_normal[face]
     along = np.einsum("ij,ij->i", normal, d)
@@ -199,11 +200,20 @@ def _rows(world: World, launch: _Launch, face: IntArray, cell: IntArray) -> dict
         "normal": normal * facing[:, None],
         "material": world.face_material[face],
         "footprint": launch.cells.edges_of(cell),
+        "joined": _joined(world, launch.cells, hit, cell),
         "speckle": launch.speckle[cell],
         "jitter": launch.jitter[cell],
         "rcs": np.full(len(cell), np.nan),
         "bounces": np.ones(len(cell), dtype=np.uint8),
     }
+
+
+def _joined(world: World, cells: Cells, hit: IntArray, cell: IntArray) -> BoolArray:
+    """Return (m, 4) whether the surface goes on in the same plane across each edge of a cell."""
+    of_cell = np.append(world.face_plane, np.int32(-1))[hit]  # a miss, -1, picks the last
+    beyond = np.append(of_cell, np.int32(-2))[cells.neighbour[cell]]  # -1 picks the last
+    same: BoolArray = beyond == of_cell[cell][:, None]
+    return same
 
 
 def _point_rows(
@@ -237,6 +247,7 @@ def _point_rows(
         "normal": -d[seen],
         "material": np.zeros(n, dtype=np.uint16),
         "footprint": np.zeros((n, 2, 3)),
+        "joined": np.zeros((n, 4), dtype=np.bool_),
         "speckle": np.zeros(n, dtype=np.complex128),
         "jitter": np.zeros((n, 2)),
         "rcs": np.array([10 ** (t.rcs_dbsm / 10) for t in targets], dtype=np.float64)[seen],
