@@ -1,7 +1,7 @@
 """Materials: what a surface does to a radar wave, one YAML entry each, every number with its source.
 
-A material is a half-space or a free-standing sheet (``thickness_m``), with an optional coating, a roughness and backscatter
-models. A second table says which material a semantic tag is made of, a third what rain turns it into.
+A material is a half-space or a free-standing sheet (``thickness_m``), with an optional coating, a roughness and
+backscatter models. A second table says which material a semantic tag is made of, a third what rain turns it into.
 """
 
 from __future__ import annotations

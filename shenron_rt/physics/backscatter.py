@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -120,10 +121,13 @@ def kirchhoff(
     frequency_hz: float,
     cos_incidence: ArrayLike,
     polarization: str,
+    *,
+    terms: int | None = None,
 ) -> FloatArray:
     """Return the incoherent sigma0 by the scalar Kirchhoff approximation.
 
-    Parameters and result are those of :func:`small_perturbation`.
+    Parameters and result are those of :func:`small_perturbation`; ``terms`` cuts the series short, None sums it
+    until it has converged.
 
     Notes
     -----
@@ -139,7 +143,8 @@ def kirchhoff(
     largest = float(np.max(exponent, initial=0.0))
     log_exponent = np.log(np.maximum(exponent, np.finfo(np.float64).tiny))
     total, log_factorial = np.zeros_like(cos), 0.0
-    for n in range(1, math.ceil(largest + 12.0 * math.sqrt(largest) + 40.0) + 1):
+    count = math.ceil(largest + 12.0 * math.sqrt(largest) + 40.0) if terms is None else terms
+    for n in range(1, count + 1):
         log_factorial += math.log(n)
         weight = np.exp(n * log_exponent - exponent - log_factorial)
         total = total + weight * _power_spectrum(correlation, correlation_m, spatial, n)
@@ -204,12 +209,18 @@ def lambertian(gamma: ArrayLike, cos_incidence: ArrayLike) -> FloatArray:
     return np.asarray(np.asarray(gamma) * np.asarray(cos_incidence, dtype=np.float64) ** 2)
 
 
+@lru_cache(maxsize=8)
+def _gauss_legendre(nodes: int) -> tuple[FloatArray, FloatArray]:
+    x, weight = np.polynomial.legendre.leggauss(nodes)
+    return x, weight
+
+
 def _root_integral(sigma0: Callable[[FloatArray], FloatArray], nodes: int) -> float:
     """Return the integral of sqrt(sigma0) over mu = cos(theta) from 0 to 1, by Gauss-Legendre in w, mu = 1 - w^2.
 
     The substitution crowds nodes at normal incidence, where the lobe of a gently rough surface is a few degrees wide.
     """
-    x, weight = np.polynomial.legendre.leggauss(nodes)
+    x, weight = _gauss_legendre(nodes)
     w = 0.5 * (x + 1.0)
     return float(np.sum(np.sqrt(np.maximum(sigma0(1.0 - w * w), 0.0)) * w * weight))
 
