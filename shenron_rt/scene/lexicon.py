@@ -94,7 +94,7 @@ _TAG_PHRASES: dict[Tag, str] = {
     ),
     Tag.Water: "water, river, lake, pond, sea, ocean, canal",
     Tag.Ground: "ground, floor, ground plane",
-    Tag.Bridge: "bridge, overpass, over pass, viaduct, foot bridge",
+    Tag.Bridge: "bridge, bridge pillar, bridge column, bridge deck, overpass, over pass, viaduct, foot bridge",
     Tag.RailTrack: "rail track, rail way, railway, railroad, rail road, rail, train track, tram track",
     Tag.GuardRail: (
         "guard rail, jersey barrier, crash barrier, w beam, concrete barrier, safety barrier, road barrier, barrier, "
@@ -112,10 +112,14 @@ _MATERIAL_PHRASES: dict[str, str] = {
     "asphalt": "asphalt, tarmac, bitumen",
     "concrete": "concrete, cement, plaster, stucco",
     "brick": "brick, masonry",
-    "wood": "wood, timber, plywood, chipboard, floorboard, bark, trunk, plank",
+    "wood": "wood, timber, plywood, chipboard, floorboard, plank",
     "vegetation": "vegetation, leaf, leaves, foliage, tree",
     "grass": "grass, lawn",
-    "soil": "soil, dirt, mud, gravel, sand, very dry ground, medium dry ground, wet ground",
+    "plasterboard": "plasterboard, plaster board, drywall",
+    "acrylic": "acrylic, plexiglass, plexiglas, lamp cover, headlight, tail light",
+    "gravel": "gravel, ballast",
+    "trunk": "trunk, bark, tree trunk",
+    "soil": "soil, dirt, mud, sand, very dry ground, medium dry ground, wet ground",
     "skin": "skin, flesh",
     "clothing": "clothing, clothes, cloth, fabric, textile",
 }

@@ -88,6 +88,7 @@ def resolve_tags(
     known = None if dump is None else read_environment_objects(dump, table)
     parts = tuple(_resolve(part, sidecar, table, known) for part in mesh.parts)
     _report_unused(sidecar, mesh.parts)
+    _report_unknown_materials(parts)
     resolved = _without_sky(mesh.with_parts(parts))
     limit = sidecar.defaults.max_unlabelled_area
     return _apply_policy(
@@ -173,6 +174,13 @@ def _report_unused(manifest: TagManifest, parts: tuple[Part, ...]) -> None:
     for number, rule in enumerate(manifest.parts):
         if not any(rule.match.fits(p) for p in parts):
             _log.warning("manifest: parts[%d] (%s) matches no part of the mesh", number, describe(rule))
+
+
+def _report_unknown_materials(parts: tuple[Part, ...]) -> None:
+    """Warn of materials by ITU-R P.2040 name that no table here has: a stated material must not vanish silently."""
+    unknown = {p.material for p in parts if p.em_material is None and "itu_" in p.material.lower()}
+    for name in sorted(unknown):
+        _log.warning("material %r is not known; its parts take the material of their tag", name)
 
 
 def _without_sky(mesh: TaggedMesh) -> TaggedMesh:
