@@ -6,6 +6,7 @@ alone, never on the number of threads, so the order of every sum is fixed.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -78,17 +79,47 @@ class Block:
         second, third, fourth = ((self.stretch * p).ravel() for p in powers)
         return second, third, fourth, (self.fast_s * x / self.fast_half_s).ravel()
 
+    @cached_property
+    def unit_targets(self) -> tuple[FloatArray, FloatArray]:
+        """The targets scaled to [-1, 1]."""
+        fast, slow = self.targets
+        return fast / self.fast_half_s, slow / self.slow_half_s
+
+    @cached_property
+    def slow_half_s(self) -> float:
+        """Largest stretched time from the middle of the block [s]."""
+        return float(np.abs(self.targets[1]).max())
+
+    @cached_property
+    def sample_rows(self) -> IntArray:
+        """Flat indices of samples that represent all: ends included, denser there, in both directions."""
+        chirps, samples = self.time.shape
+        slow, fast = (np.unique(np.rint((n - 1) * _toward_ends(k))) for n, k in ((chirps, 15), (samples, 7)))
+        rows: IntArray = (slow[:, None] * samples + fast).ravel().astype(int)
+        return rows
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Sampling rate of the ADC [Hz]."""
+        return (len(self.fast_s) - 1) / (2 * self.fast_half_s)
+
     @property
     def fast_half_s(self) -> float:
         """Half of the sampled window, first to last sample [s]."""
         return float(self.fast_s[-1])
 
 
+def _toward_ends(count: int) -> FloatArray:
+    """Return Chebyshev extrema on [0, 1]."""
+    values: FloatArray = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
+    return values
+
+
 def cut(clock: Clock, chirp_start_s: FloatArray, count: int) -> list[Block]:
     """Cut the chirps into ``count`` blocks of nearly equal size."""
     edges = np.linspace(0, len(chirp_start_s), count + 1).round().astype(int)
     time = chirp_start_s[:, None] + clock.sample_s - clock.frame_mid_s
-    return [Block(clock, slice(int(a), int(b)), time[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    return [Block(clock, slice(int(a), int(b)), time[a:b]) for a, b in itertools.pairwise(edges) if b > a]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ block is cut; see ``blocks``.
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -24,11 +25,11 @@ from functools import partial
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .blocks import Block, Group, cut, group_points
 from .direct import direct_field
-from .expansion import bessel, chebyshev, select_terms
+from .expansion import LowRank
 from .signal import Clock, Field, Points
 
 __all__ = ["nufft_field", "worker_count"]
@@ -36,12 +37,14 @@ __all__ = ["nufft_field", "worker_count"]
 TAU = 2 * np.pi
 #: Shares of the accuracy: the transform, the expansion, what is neglected.
 TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.3, 0.4, 0.2
-#: Rounding of a single-precision coordinate, relative.
-SINGLE_ULP = 6e-8
+#: Coarsest rounding of a single-precision coordinate, relative, and the least accuracy single precision is used for.
+SINGLE_ULP, SINGLE_ACCURACY = 6e-8, 5e-5
+#: Echoes whose residual phases choose the low-rank form.
+SAMPLED_ECHOES = 192
 
 
 def worker_count() -> int:
-    """Threads used: OMP_NUM_THREADS where it is set, else the cores this process may use. Results do not depend on it."""
+    """Return OMP_NUM_THREADS where it is set, else the number of cores this process may use."""
     asked = os.environ.get("OMP_NUM_THREADS", "")
     return int(asked) if asked.isdigit() and int(asked) > 0 else len(os.sched_getaffinity(0))
 
@@ -156,33 +159,42 @@ class _Moved:
 def _transform(accuracy: float, block: Block, points: _Moved, tx_m: FloatArray, rx_m: FloatArray) -> ComplexArray:
     """Sum the echoes of one element pair over one block: (n_chirps, n_samples)."""
     phase = _Phase.of(block, points, tx_m, rx_m)
-    spans = [(float(x.min()), float(x.max())) for x in phase.residuals]
-    half = [(high - low) / 2 for low, high in spans]
-    terms = select_terms(half, EXPANSION_SHARE * accuracy)
-    used = [max(orders[i] for orders in terms) + 1 for i in range(len(half))]
-    strengths = points.amplitude * _unit_phasor(phase.constant)
-    tables = [
-        chebyshev((x - (low + high) / 2) / h, count) if count > 1 else []
-        for x, (low, high), h, count in zip(phase.residuals, spans, half, used, strict=True)
-    ]
-    rows = np.empty((len(terms), len(strengths)), dtype=np.complex128)
-    for row, orders in zip(rows, terms, strict=True):
-        row[:] = strengths
-        for table, p in zip(tables, orders, strict=True):
-            if p:
-                row *= table[p]
-    sums = _type3(TRANSFORM_SHARE * accuracy, block, phase, rows)
-    waves = [bessel(h * b, count) if count > 1 else [] for h, b, count in zip(half, block.shapes, used, strict=True)]
-    total = np.zeros(sums.shape[1], dtype=np.complex128)
-    for value, orders in zip(sums, terms, strict=True):
-        term = value.astype(np.complex128)
-        for i, wave in enumerate(waves):
-            if wave:
-                term *= wave[orders[i]]
-        total += term
-    middle = sum((low + high) / 2 * b for (low, high), b in zip(spans, block.shapes, strict=True))
-    total *= np.exp(1j * middle)
+    middle, half = _centre(phase.residuals)
+    used = [i for i, a in enumerate(half) if a > EXPANSION_SHARE / 100 * accuracy]
+    amplitudes = [half[i] for i in used]
+    parameters = [(phase.residuals[i] - middle[i]) / half[i] for i in used]
+    shapes = [block.shapes[i] for i in used]
+    rows = _sample_rows(parameters, len(phase.constant))
+    form = LowRank.fit(
+        amplitudes,
+        [x[rows] for x in parameters],
+        [b[block.sample_rows] for b in shapes],
+        EXPANSION_SHARE * accuracy,
+    )
+    axes = _Axes.of(block, phase)
+    single = accuracy >= SINGLE_ACCURACY and axes.extent * SINGLE_ULP <= TRANSFORM_SHARE * accuracy
+    amplitude = _times_phasor(points.amplitude, phase.constant + axes.folds / 2, single)
+    sums = _type3(TRANSFORM_SHARE * accuracy, axes, form.strengths(amplitude, parameters))
+    total = (sums * form.waves(shapes)).sum(axis=0) if used else sums[0].astype(np.complex128)
+    angle = axes.fast_mid * block.targets[0] + axes.slow_mid * block.targets[1]
+    for a, b in zip(middle, block.shapes, strict=True):
+        angle += a * b
+    total *= np.exp(1j * angle)
     return total.reshape(block.time.shape)
+
+
+def _centre(values: Iterable[FloatArray]) -> tuple[list[float], list[float]]:
+    """Return the middle of every array's values, and half of their spread."""
+    spans = [(float(x.min()), float(x.max())) for x in values]
+    return [(low + high) / 2 for low, high in spans], [(high - low) / 2 for low, high in spans]
+
+
+def _sample_rows(parameters: list[FloatArray], n: int) -> IntArray:
+    """Choose echoes that stand for all: evenly spread rows, and the extremes of every parameter and of their sums."""
+    rows = [np.unique(np.linspace(0, n - 1, SAMPLED_ECHOES).astype(int))]
+    sums = [*parameters, *(a + s * b for a, b in itertools.combinations(parameters[:3], 2) for s in (1, -1))]
+    rows += [np.array([x.argmin(), x.argmax()]) for x in sums]
+    return np.unique(np.concatenate(rows))
 
 
 @dataclass(frozen=True)
@@ -199,7 +211,8 @@ class _Phase:
         there, back = points.range_derivatives(tx_m), points.range_derivatives(rx_m)
         t0, t1, t2, t3, t4 = ((a + b) / SPEED_OF_LIGHT for a, b in zip(there, back, strict=True))
         h, fc, k = block.half_s, block.clock.window_mid_hz, block.clock.slope_hz_per_s
-        # Taylor to Chebyshev on [-h, h]: T^2 = h^2 (1 + C2) / 2, T^3 = h^3 (3 C1 + C3) / 4, T^4 = h^4 (3 + 4 C2 + C4) / 8
+        # Taylor to Chebyshev on [-h, h]:
+        # T^2 = h^2 (1 + C2) / 2, T^3 = h^3 (3 C1 + C3) / 4, T^4 = h^4 (3 + 4 C2 + C4) / 8
         d0 = t0 + h**2 / 4 * t2 + h**4 / 64 * t4
         d1 = t1 + h**2 / 8 * t3
         seen = fc - k * d0
@@ -212,19 +225,51 @@ class _Phase:
         return cls(constant, TAU * k * d0, TAU * seen * d1, (second, third, fourth, cross))
 
 
-def _unit_phasor(cycles: FloatArray) -> ComplexArray:
-    angle = TAU * (cycles - np.rint(cycles))
-    phasor = np.empty(len(angle), dtype=np.complex128)
+@dataclass(frozen=True)
+class _Axes:
+    """Sources and targets of the transform, shifted and scaled: targets within [-1, 1], sources in radians.
+
+    A fast frequency is only known modulo the sampling rate: ``folds`` multiples of it were taken off, each of which
+    changes the sign of every other echo where the number of samples is even.
+    """
+
+    fast: FloatArray
+    slow: FloatArray
+    targets: tuple[FloatArray, FloatArray]
+    fast_mid: float
+    slow_mid: float
+    folds: FloatArray
+    extent: float
+
+    @classmethod
+    def of(cls, block: Block, phase: _Phase) -> _Axes:
+        (fast_mid, slow_mid), (fast_half, _) = _centre((phase.fast, phase.slow))
+        fast, slow = phase.fast - fast_mid, (phase.slow - slow_mid) * block.slow_half_s
+        rate = TAU * block.sample_rate_hz
+        folds = np.rint(fast / rate) if fast_half > rate / 2 else np.zeros(1)
+        fast = (fast - rate * folds) * block.fast_half_s
+        extent = float(np.abs(fast).max() + np.abs(slow).max())
+        odd = folds * (len(block.fast_s) - 1)
+        return cls(fast, slow, block.unit_targets, fast_mid, slow_mid, odd, extent)
+
+
+def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, single: bool) -> ComplexArray:
+    """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
+    turn = cycles - np.rint(cycles)
+    angle = TAU * turn.astype(np.float32 if single else np.float64)
+    phasor = np.empty(len(angle), dtype=np.complex64 if single else np.complex128)
     np.cos(angle, out=phasor.real)
     np.sin(angle, out=phasor.imag)
+    phasor *= amplitude.astype(phasor.dtype)
     return phasor
 
 
-def _type3(accuracy: float, block: Block, phase: _Phase, rows: ComplexArray) -> ComplexArray:
-    """Sum rows[r, q] exp(j (fast_q s + slow_q T')) at the samples of the block: (n_rows, n_chirps * n_samples)."""
+def _type3(accuracy: float, axes: _Axes, rows: ComplexArray) -> ComplexArray:
+    """Sum rows[r, q] exp(j (fast_q s + slow_q T')) at the targets: (n_rows, n_targets), in the precision of the rows."""
     import finufft
 
-    s, slow = block.targets
-    return np.asarray(
-        finufft.nufft2d3(phase.fast, phase.slow, rows, s, slow, eps=accuracy, isign=1, nthreads=1, upsampfac=1.25)
-    ).reshape(len(rows), -1)
+    real = rows.real.dtype
+    sources = axes.fast.astype(real, copy=False), axes.slow.astype(real, copy=False)
+    s, slow = (t.astype(real, copy=False) for t in axes.targets)
+    sums = finufft.nufft2d3(*sources, rows, s, slow, eps=accuracy, isign=1, nthreads=1, upsampfac=1.25)
+    return np.asarray(sums).reshape(len(rows), -1)
