@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Literal
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from ..physics.backscatter import (
     lambertian,
     small_perturbation,
 )
+from ..physics.fresnel import fresnel_cos
 from ._base import ConfigModel
 
-__all__ = ["Backscatter"]
+__all__ = ["Backscatter", "Surface"]
 
 FloatArray = NDArray[np.float64]
 #: One level, or levels at several frequencies [GHz], between which the logarithm of the frequency interpolates.
@@ -33,6 +34,16 @@ def _linear_level(level_db: LevelDb, frequency_hz: float) -> float:
     points = sorted(level_db.items())
     at = np.interp(math.log(frequency_hz / 1e9), [math.log(f) for f, _ in points], [db for _, db in points])
     return float(10.0 ** (0.1 * at))
+
+
+class Surface(NamedTuple):
+    """What the models need to know of the surface they belong to."""
+
+    eps: complex
+    roughness_rms_m: float
+    frequency_hz: float
+    reflectivity: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    """(|R_TE|^2, |R_TM|^2) of the smooth surface, coating included, at an array of cosines."""
 
 
 class _Gamma(ConfigModel):
@@ -51,9 +62,9 @@ class ConstantGamma(_Gamma):
 
     model: Literal["constant_gamma"]
 
-    def sigma0(self, eps: complex, roughness: float, frequency_hz: float, cos: FloatArray, pol: str) -> FloatArray:
+    def sigma0(self, surface: Surface, cos: FloatArray, polarization: str) -> FloatArray:
         """Return sigma0 [m^2/m^2]."""
-        return constant_gamma(_linear_level(self.gamma_db, frequency_hz), cos)
+        return constant_gamma(_linear_level(self.gamma_db, surface.frequency_hz), cos)
 
 
 class Lambertian(_Gamma):
@@ -61,9 +72,9 @@ class Lambertian(_Gamma):
 
     model: Literal["lambertian"]
 
-    def sigma0(self, eps: complex, roughness: float, frequency_hz: float, cos: FloatArray, pol: str) -> FloatArray:
+    def sigma0(self, surface: Surface, cos: FloatArray, polarization: str) -> FloatArray:
         """Return sigma0 [m^2/m^2]."""
-        return lambertian(_linear_level(self.gamma_db, frequency_hz), cos)
+        return lambertian(_linear_level(self.gamma_db, surface.frequency_hz), cos)
 
 
 class _Surface(ConfigModel):
@@ -74,13 +85,14 @@ class _Surface(ConfigModel):
 
 
 class SmallPerturbation(_Surface):
-    """First-order small-perturbation method."""
+    """First-order small-perturbation method; a coating is ignored, as its closed form is for a half-space."""
 
     model: Literal["small_perturbation"]
 
-    def sigma0(self, eps: complex, roughness: float, frequency_hz: float, cos: FloatArray, pol: str) -> FloatArray:
+    def sigma0(self, surface: Surface, cos: FloatArray, polarization: str) -> FloatArray:
         """Return sigma0 [m^2/m^2]."""
-        return small_perturbation(eps, roughness, self.correlation_m, self.correlation, frequency_hz, cos, pol)
+        eps, roughness, frequency_hz, _ = surface
+        return small_perturbation(eps, roughness, self.correlation_m, self.correlation, frequency_hz, cos, polarization)
 
 
 class Kirchhoff(_Surface):
@@ -88,9 +100,20 @@ class Kirchhoff(_Surface):
 
     model: Literal["kirchhoff"]
 
-    def sigma0(self, eps: complex, roughness: float, frequency_hz: float, cos: FloatArray, pol: str) -> FloatArray:
+    def sigma0(self, surface: Surface, cos: FloatArray, polarization: str) -> FloatArray:
         """Return sigma0 [m^2/m^2]."""
-        return kirchhoff(eps, roughness, self.correlation_m, self.correlation, frequency_hz, cos, pol)
+        eps, roughness, frequency_hz, reflectivity = surface
+        power = reflectivity(cos)[1 if polarization == "VV" else 0]
+        return kirchhoff(
+            eps,
+            roughness,
+            self.correlation_m,
+            self.correlation,
+            frequency_hz,
+            cos,
+            polarization,
+            reflectivity=power,
+        )
 
 
 class GeometricOptics(ConfigModel):
@@ -99,9 +122,10 @@ class GeometricOptics(ConfigModel):
     model: Literal["geometric_optics"]
     slope_rms: Annotated[float, Field(gt=0)]
 
-    def sigma0(self, eps: complex, roughness: float, frequency_hz: float, cos: FloatArray, pol: str) -> FloatArray:
+    def sigma0(self, surface: Surface, cos: FloatArray, polarization: str) -> FloatArray:
         """Return sigma0 [m^2/m^2]."""
-        return geometric_optics(eps, self.slope_rms, cos)
+        coated, bare = surface.reflectivity(np.ones(1))[0][0], np.abs(fresnel_cos(surface.eps, 1.0)[0]) ** 2
+        return geometric_optics(surface.eps, self.slope_rms, cos) * (coated / bare if bare > 0.0 else 0.0)
 
 
 Backscatter = Annotated[

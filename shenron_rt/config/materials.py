@@ -23,7 +23,7 @@ from ..physics.fresnel import POLARIZATIONS, fresnel_cos, layered
 from ..physics.roughness import coherent_factor
 from ..resources import find
 from ..tags import SemanticTag, parse_tag
-from ._backscatter import Backscatter
+from ._backscatter import Backscatter, Surface
 from ._base import ConfigModel
 from ._permittivity import Permittivity
 from .loader import parse_model
@@ -186,17 +186,19 @@ class Material(ConfigModel):
         return np.asarray(np.exp(np.interp(angle, _TABLE_ANGLE, self._tables[key])))
 
     def _limited(self, frequency_hz: float, cos: FloatArray, polarization: str) -> FloatArray:
-        eps = self.permittivity_at(frequency_hz)
         wavenumber = 2.0 * np.pi * frequency_hz / SPEED_OF_LIGHT
 
+        def reflectivity(c: FloatArray) -> tuple[FloatArray, FloatArray]:
+            te, tm = self.reflection(frequency_hz, c)
+            return np.abs(te) ** 2, np.abs(tm) ** 2
+
+        surface = Surface(self.permittivity_at(frequency_hz), self.roughness_rms_m, frequency_hz, reflectivity)
+
         def plain(c: FloatArray) -> FloatArray:
-            values = (m.sigma0(eps, self.roughness_rms_m, frequency_hz, c, polarization) for m in self.backscatter)
-            return np.asarray(sum(values))
+            return np.asarray(sum(m.sigma0(surface, c, polarization) for m in self.backscatter))
 
         def budget(c: FloatArray) -> FloatArray:
-            te, tm = self.reflection(frequency_hz, c)
-            power = np.abs(te) ** 2, np.abs(tm) ** 2
-            return diffuse_budget(*power, wavenumber, self.roughness_rms_m, self.volume_albedo, c)
+            return diffuse_budget(*reflectivity(c), wavenumber, self.roughness_rms_m, self.volume_albedo, c)
 
         return limit_sigma0(plain, budget, cos, cross_ratio=self.cross_ratio)
 

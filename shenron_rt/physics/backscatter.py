@@ -123,11 +123,13 @@ def kirchhoff(
     polarization: str,
     *,
     terms: int | None = None,
+    reflectivity: ArrayLike | None = None,
 ) -> FloatArray:
     """Return the incoherent sigma0 by the scalar Kirchhoff approximation.
 
     Parameters and result are those of :func:`small_perturbation`; ``terms`` cuts the series short, None sums it
-    until it has converged.
+    until it has converged; ``reflectivity`` is |R|^2 at each cosine where the surface is coated and ``eps`` does not
+    tell it.
 
     Notes
     -----
@@ -137,7 +139,8 @@ def kirchhoff(
     """
     k, cos = _wavenumber(frequency_hz), np.asarray(cos_incidence, dtype=np.float64)
     te, tm = fresnel_cos(eps, cos)
-    power = np.abs(tm if _is_vertical(polarization) else te) ** 2
+    bare = np.abs(tm if _is_vertical(polarization) else te) ** 2
+    power = bare if reflectivity is None else np.asarray(reflectivity, dtype=np.float64)
     exponent = 4.0 * (k * roughness_rms_m * cos) ** 2
     spatial = 2.0 * k * np.sqrt(1.0 - cos * cos)
     largest = float(np.max(exponent, initial=0.0))

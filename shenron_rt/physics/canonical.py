@@ -225,8 +225,8 @@ def near_range_plate_rcs(a: float, b: float, wavelength: float, range_m: float) 
 
     Notes
     -----
-    Gauss-Legendre over a quarter of the plate, twelve nodes for each cycle of the two-way phase or less, so the result is
-    converged to better than 1e-6.
+    Gauss-Legendre over a quarter of the plate, twelve nodes for each cycle of the two-way phase or less, so the result
+    is converged to better than 1e-6.
     """
     k = 2.0 * math.pi / wavelength
 
