@@ -18,7 +18,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from ..constants import SPEED_OF_LIGHT
 from ..errors import InputError, did_you_mean
-from ..physics.backscatter import diffuse_albedo, diffuse_budget, limit_sigma0
+from ..physics.energy import diffuse_albedo, diffuse_budget, limit_sigma0
 from ..physics.fresnel import POLARIZATIONS, fresnel_cos, layered
 from ..physics.roughness import coherent_factor
 from ..resources import find

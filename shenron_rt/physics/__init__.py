@@ -7,16 +7,7 @@ from __future__ import annotations
 
 from .antenna import AntennaPattern, CosinePattern, GaussianPattern, IsotropicPattern, TabulatedPattern
 from .attenuation import fog_attenuation, gas_attenuation, liquid_water_content, rain_attenuation, two_way_loss
-from .backscatter import (
-    constant_gamma,
-    diffuse_albedo,
-    diffuse_budget,
-    geometric_optics,
-    kirchhoff,
-    lambertian,
-    limit_sigma0,
-    small_perturbation,
-)
+from .backscatter import constant_gamma, geometric_optics, kirchhoff, lambertian, small_perturbation
 from .canonical import (
     cylinder_rcs,
     dihedral_rcs,
@@ -30,6 +21,7 @@ from .canonical import (
     tophat_rcs,
     trihedral_rcs,
 )
+from .energy import diffuse_albedo, diffuse_budget, limit_sigma0
 from .fresnel import SlabCoefficients, backscatter_reflection, fresnel, fresnel_cos, layered, slab
 from .link_budget import noise_power, rcs_from_power, received_power, snr
 from .noise import noise_power_per_sample
