@@ -1,7 +1,8 @@
 """How much a surface may scatter: the hemispherical energy of a backscatter curve, and the limit it must keep.
 
-What a rough surface sends back incoherently is power that its mirror-like reflection lost, or power that entered and was
-scattered out again. Published sigma0 curves know nothing of each other's permittivity and roughness; this makes them fit.
+What a rough surface sends back incoherently is power that its mirror-like reflection lost, or power that entered and
+was scattered out again. Published sigma0 curves know nothing of a model's permittivity and roughness; this makes them
+fit.
 """
 
 from __future__ import annotations
