@@ -10,6 +10,7 @@ from ..mesh import Part, TaggedMesh
 from . import canonical, people, road, vegetation
 from ._piece import Piece
 from ._text import Recipe, parse
+from .car import car
 
 __all__ = ["SHAPES", "make_shape"]
 
@@ -27,6 +28,7 @@ SHAPES: dict[str, Recipe] = {
     "pole": Recipe(road.pole, (), {"h": 6.0, "r": 0.08}),
     "guard_rail": Recipe(road.guard_rail, (), {"l": 20.0, "h": 0.75}),
     "tree": Recipe(vegetation.tree, (), {"h": 8.0, "crown": math.nan}),
+    "car": Recipe(car),
     "pedestrian": Recipe(people.pedestrian, (), {"h": 1.75, "stride": 0.6}),
 }
 

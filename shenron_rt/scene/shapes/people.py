@@ -15,7 +15,7 @@ _TARGET_HEIGHT = 1.80
 
 
 def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
-    """Return a walking adult of height ``h`` facing +x, feet ``stride`` apart, about 6 k triangles [m].
+    """Return a walking adult of height ``h`` facing +x, feet ``stride`` apart, about 9 k triangles [m].
 
     Head and hands are skin, the rest clothing, the shoes rubber. Origin on the ground below the hip.
     """
@@ -26,7 +26,7 @@ def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
     hip = 0.10 + np.sqrt(max(leg**2 - half**2, (0.3 * leg) ** 2))
     rise = hip - 0.92
     cloth = [_torso(rise)]
-    skin = [ellipsoid([0.105, 0.08, 0.135], 7, [0.02, 0.0, 1.665 + rise]), _neck(rise)]
+    skin = [ellipsoid([0.105, 0.08, 0.135], 12, [0.02, 0.0, 1.665 + rise]), _neck(rise)]
     shoes = []
     for side, forward in ((1.0, half), (-1.0, -half)):
         foot = np.array([forward, side * 0.10, 0.10])
@@ -54,7 +54,7 @@ def _torso(rise: float) -> tuple[FloatArray, IntArray]:
     deep = np.array([0.0, 0.10, 0.125, 0.11, 0.12, 0.125, 0.10, 0.06, 0.0])
     wide = np.array([0.0, 0.13, 0.18, 0.16, 0.18, 0.215, 0.21, 0.12, 0.0])
     fine = np.linspace(height[0], height[-1], 33)
-    angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
     depth, width = np.interp(fine, height, deep), np.interp(fine, height, wide)
     x, y = depth[:, None] * np.cos(angle), width[:, None] * np.sin(angle)
     return grid(np.stack([x, y, np.broadcast_to(fine[:, None], x.shape)], axis=2), wrap=True)

@@ -32,7 +32,7 @@ def tree(h: float = 8.0, crown: float | None = None) -> list[Piece]:
         wood.append(tube(bend, np.linspace(0.008, 0.003, 5) * h, 8))
     leaves = [ellipsoid(size, _CLUMP_FREQUENCY, centre) for centre in centres]
     return [
-        Piece("trunk", "wood", SemanticTag.Vegetation, *join(*wood)),
+        Piece("trunk", "trunk", SemanticTag.Vegetation, *join(*wood)),
         Piece("crown", "vegetation", SemanticTag.Vegetation, *join(*leaves)),
     ]
 
