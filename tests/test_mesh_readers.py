@@ -388,3 +388,23 @@ def test_degenerate_faces_are_counted_through_the_reader(tmp_path, caplog) -> No
         mesh = read_mesh(write(tmp_path, "a.obj", TRIANGLE + "f 1 2 3\nf 1 2 2\n"))
     assert mesh.repaired == {"degenerate_faces": 1}
     assert "dropped 1 of 2 triangles" in caplog.text
+
+
+@pytest.mark.parametrize("bits", [0x7FA00000, 0x7F800000, 0x7F7FFFFF])  # signalling NaN, infinity, 3.4e38
+@pytest.mark.parametrize("suffix", [".stl", ".gltf", ".ply"])
+def test_vertices_that_are_no_numbers_are_counted_in_every_binary_format(tmp_path, suffix: str, bits: int) -> None:
+    bad = struct.pack("<I", bits)
+    points = bad + np.array([0, 0, 1, 0, 0, 0, 1, 0], dtype="<f4").tobytes()
+    if suffix == ".stl":
+        content = b"\0" * 80 + struct.pack("<I", 1) + b"\0" * 12 + points + b"\0\0"
+    elif suffix == ".ply":
+        header = PLY_VERTICES.format(f="binary_little_endian", t="float").replace("vertex 4", "vertex 3")
+        header += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        content = header.encode() + points + struct.pack("<B3i", 3, 0, 1, 2)
+    else:
+        document = gltf([{"mesh": 0}])
+        data = points + np.array([0, 1, 2, 0], dtype="<u2").tobytes()
+        document["buffers"][0]["uri"] = "data:;base64," + base64.b64encode(data).decode()
+        content = json.dumps(document).encode()
+    with pytest.raises(InputError, match="1 of 3 vertices are NaN or infinite"):
+        read_mesh(write(tmp_path, f"a{suffix}", content))

@@ -22,6 +22,8 @@ _log = logging.getLogger(__name__)
 # Twice the area over the squared longest edge, below which a face has no usable normal: rounding in float64 already
 # turns the normal of such a sliver by more than a degree.
 _SLIVER = 1e-13
+# Coordinates beyond this are rubbish in any unit, and their products would overflow.
+_FARTHEST = 1e12
 
 
 @dataclass(frozen=True)
@@ -210,9 +212,11 @@ def _as_int32(values: ArrayLike, where: str, what: str) -> IntArray:
 def _check_arrays(where: str, vertices: FloatArray, faces: IntArray, part: IntArray, n_parts: int) -> None:
     if vertices.ndim != 2 or vertices.shape[-1] != 3:
         raise InputError(f"{where}: vertices must have shape (v, 3), got {vertices.shape}")
-    bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
+    bad = int(np.count_nonzero(~(np.abs(vertices) < _FARTHEST).all(axis=1)))
     if bad:
-        raise InputError(f"{where}: {bad} of {len(vertices)} vertices are NaN or infinite; repair the mesh first")
+        raise InputError(
+            f"{where}: {bad} of {len(vertices)} vertices are NaN or infinite (or beyond {_FARTHEST:g}); repair the mesh"
+        )
     if faces.size == 0:
         raise InputError(f"{where}: the mesh has no triangles; point clouds and line sets cannot reflect")
     if faces.ndim != 2 or faces.shape[1] != 3:

@@ -18,6 +18,8 @@ from ._raw import read_bytes
 __all__ = ["Buffers", "load_buffers"]
 
 _COMPONENT = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+# Accessors without a buffer view are zeros, so their size is not bounded by the size of the file.
+_MAX_IMPLICIT = 1 << 24
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
@@ -34,6 +36,8 @@ class Buffers:
         kind, width, count = np.dtype(_COMPONENT[entry["componentType"]]), _WIDTH[entry["type"]], int(entry["count"])
         if "bufferView" in entry:
             values = self._view(entry["bufferView"], entry.get("byteOffset", 0), kind, width, count)
+        elif count > _MAX_IMPLICIT:
+            raise InputError(f"a glTF accessor asks for {count} zeros without data, at most {_MAX_IMPLICIT} are made")
         else:
             values = np.zeros((count, width), kind)
         if "sparse" in entry:

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..._typing import FloatArray, IntArray
+import numpy as np
+
+from ..._typing import ArrayLike, FloatArray, IntArray
 from ...errors import InputError, NotFoundError
 from ..mesh import Part
 
-__all__ = ["RawMesh", "read_bytes"]
+__all__ = ["RawMesh", "as_float64", "placed", "read_bytes"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,18 @@ class RawMesh:
     part: IntArray
     parts: tuple[Part, ...]
     repaired: Mapping[str, int] = field(default_factory=dict)
+
+
+def as_float64(values: ArrayLike) -> FloatArray:
+    """Widen coordinates; a signalling NaN in the file stays a NaN, which the mesh counts and refuses."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(values).astype(np.float64)
+
+
+def placed(vertices: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Apply a 4x4 matrix to (n, 3) points; an infinite one becomes NaN, which the mesh counts and refuses."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(vertices @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def read_bytes(file: Path) -> bytes:

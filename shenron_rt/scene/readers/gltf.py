@@ -18,7 +18,7 @@ from ..._typing import FloatArray, IntArray
 from ...errors import InputError
 from ..mesh import Part
 from ._gltf_buffers import Buffers, load_buffers
-from ._raw import RawMesh, read_bytes
+from ._raw import RawMesh, as_float64, placed, read_bytes
 
 __all__ = ["read_gltf"]
 
@@ -121,7 +121,7 @@ class _Walker:
             if triangles is None:
                 self._skipped += 1
                 continue
-            vertices = self._buffers.accessor(primitive["attributes"]["POSITION"])[0].astype(np.float64)
+            vertices = as_float64(self._buffers.accessor(primitive["attributes"]["POSITION"])[0])
             material = self._doc["materials"][primitive["material"]] if "material" in primitive else {}
             given = {**_extras(material), **extras, **_extras(mesh), **_extras(primitive)}
             self._parts.append(
@@ -136,7 +136,7 @@ class _Walker:
             )
             for matrix in places:
                 flip = np.linalg.det(matrix[:3, :3]) < 0  # glTF: a mirrored node reverses its winding
-                self._vertices.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
+                self._vertices.append(placed(vertices, matrix))
                 self._faces.append((triangles[:, ::-1] if flip else triangles) + self._n_vertices)
                 self._part.append(np.full(len(triangles), len(self._parts) - 1, dtype=np.int32))
                 self._n_vertices += len(vertices)
@@ -182,7 +182,7 @@ def _local_matrix(node: dict[str, Any]) -> FloatArray:
 
 
 def _instance_matrices(buffers: Buffers, attributes: dict[str, int]) -> FloatArray:
-    columns = {name: buffers.accessor(index)[0].astype(np.float64) for name, index in attributes.items()}
+    columns = {name: as_float64(buffers.accessor(index)[0]) for name, index in attributes.items()}
     n = len(next(iter(columns.values())))
     return _compose(
         columns.get("TRANSLATION", np.zeros((n, 3))),

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..._typing import FloatArray
 from ...errors import InputError
-from ._raw import RawMesh, read_bytes
+from ._raw import RawMesh, placed, read_bytes
 from .obj import read_obj
 from .ply import read_ply
 from .stl import read_stl
@@ -84,7 +84,7 @@ def _shape(file: Path, shape: ET.Element) -> RawMesh:
     matrix = _to_world(file, name, shape)
     faces = raw.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else raw.faces
     parts = tuple(replace(p, object=p.object or name, material=material or p.material) for p in raw.parts)
-    return replace(raw, vertices=raw.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces=faces, parts=parts)
+    return replace(raw, vertices=placed(raw.vertices, matrix), faces=faces, parts=parts)
 
 
 def _to_world(file: Path, name: str, shape: ET.Element) -> FloatArray:

@@ -12,7 +12,7 @@ from ..._typing import FloatArray, IntArray
 from ...errors import InputError
 from ..mesh import Part
 from ._polygons import fan
-from ._raw import RawMesh, read_bytes
+from ._raw import RawMesh, as_float64, read_bytes
 
 __all__ = ["read_ply"]
 
@@ -64,7 +64,7 @@ def read_ply(file: Path) -> RawMesh:
     if count.min() < 3:
         raise InputError(f"{file}: a face has {int(count.min())} corners, at least 3 are needed")
     faces, source = fan(flat.astype(np.int64), count.astype(np.int64))
-    vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
+    vertices = np.stack([as_float64(vertex[axis]) for axis in "xyz"], axis=1)
     parts, part = _parts(file, face)
     return RawMesh(vertices, faces, part[source] if part is not None else np.zeros(len(faces), dtype=np.int32), parts)
 

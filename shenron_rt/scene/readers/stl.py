@@ -10,7 +10,7 @@ import numpy as np
 from ..._typing import FloatArray
 from ...errors import InputError
 from ..mesh import Part
-from ._raw import RawMesh, read_bytes
+from ._raw import RawMesh, as_float64, read_bytes
 
 __all__ = ["read_stl"]
 
@@ -30,14 +30,13 @@ def read_stl(file: Path) -> RawMesh:
     # A binary file may start with "solid" too; only the size tells for sure.
     count = int.from_bytes(content[80:_HEADER], "little") if len(content) >= _HEADER else -1
     if count >= 0 and len(content) == _HEADER + count * _ROW.itemsize:
-        corners, name = np.frombuffer(content, _ROW, count, _HEADER)["corners"].astype(np.float64).reshape(-1, 3), ""
+        corners, name = as_float64(np.frombuffer(content, _ROW, count, _HEADER)["corners"]).reshape(-1, 3), ""
     elif content.lstrip()[:5].lower() == b"solid":
         corners, name = _ascii(file, content.decode("latin-1"))
     else:
         raise InputError(f"{file}: not an STL file (its size does not fit {count} triangles, and it is not ASCII)")
     if not len(corners):
         raise InputError(f"{file}: no triangles in this STL file")
-    # nan != nan: without equal_nan every broken corner would become a vertex of its own, which the mesh then counts
     vertices, index = np.unique(corners, axis=0, return_inverse=True)
     part = Part(object=name, file=str(file))
     return RawMesh(vertices, index.reshape(-1, 3), np.zeros(len(corners) // 3, dtype=np.int32), (part,))
