@@ -157,6 +157,8 @@ class Scene(ConfigModel):
     point_targets: tuple[PointTarget, ...] = ()
     radars: tuple[RadarMount, ...] = (RadarMount(),)
     lidars: tuple[LidarMount, ...] = ()
+    #: Options of the run that wrote this file (``config.yaml`` of a run folder); the command line takes them up again.
+    run: Mapping[str, Any] = Field(default_factory=dict, repr=False)
     folder: Path = Field(default_factory=Path.cwd, exclude=True, repr=False)
 
     @model_validator(mode="after")

@@ -1,0 +1,190 @@
+"""``shenron-rt process``: ADC data in, a run folder out."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from ..errors import InputError, NotFoundError
+from .common import (
+    Json,
+    Output,
+    Overrides,
+    Overwrite,
+    SetOptions,
+    frame_range,
+    override_profile,
+    print_json,
+    progress,
+    say,
+)
+
+if TYPE_CHECKING:
+    from ..config.profile import RadarProfile
+    from ..dsp import Detections, RadarCube
+    from ..returns import Returns
+    from ..synthesis.adc import AdcCube
+
+__all__ = ["process"]
+
+LayoutName = Literal["two_lane", "four_lane"]
+LevelName = Literal["watts", "counts", "noise"]
+
+
+@dataclass(frozen=True)
+class ProcessedFrame:
+    """A frame that began as ADC data."""
+
+    adc: AdcCube
+    cube: RadarCube
+    detections: Detections
+    frame: int
+    time: float = 0.0
+    returns: Returns | None = None
+
+
+def process(
+    adc: Path,
+    /,
+    *,
+    output: Output = None,
+    overwrite: Overwrite = False,
+    profile: str | None = None,
+    set_: SetOptions = None,
+    frames: str | None = None,
+    layout: Annotated[
+        LayoutName,
+        Parameter(help="Byte layout of a .bin capture: two_lane (xWR16/18/68xx), four_lane (xWR12/14/22xx)."),
+    ] = "two_lane",
+    level: Annotated[
+        LevelName | None,
+        Parameter(
+            help="Unit of the file: watts (its square root), counts (of full_scale_dbm), noise (floor set nominal)."
+        ),
+    ] = None,
+    pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
+    json_: Json = False,
+) -> int:
+    """Process ADC data to maps and detections.
+
+    Parameters
+    ----------
+    adc
+        An adc.npz of a run, a plain .npy array (chirp, antenna, sample) or (frame, chirp, antenna, sample), or a raw
+        DCA1000 capture (.bin).
+    profile
+        Radar that made the data; an adc.npz carries its own.
+    frames
+        Frames A:B of the file, B not included. Default: all.
+    """
+    from .. import runs
+
+    overrides = Overrides(set_)
+    overrides.only_profile("process")
+    cubes = _read(adc, profile, overrides, layout, level)
+    wanted = frame_range(frames) if frames else range(len(cubes))
+    if wanted.stop > len(cubes):
+        raise InputError(f"--frames {frames}: {adc} has {len(cubes)} frames, 0:{len(cubes)} is all of them")
+    used = cubes[0].profile
+    folder = output or runs.default_folder(adc.stem, used.name)
+    with (
+        runs.write_run(folder, overwrite=overwrite) as partial,
+        progress(len(wanted), "processing", quiet=json_) as step,
+    ):
+        records = []
+        for index in wanted:
+            frame = _frame(cubes[index], index)
+            place = runs.frame_folder(partial, used.name, index)
+            runs.write_frame(place, frame)
+            if pictures:
+                from ..plot import write_pictures
+
+                write_pictures(place, frame, title=f"{adc.name} ({used.name}), frame {index}")
+            records.append(runs.frame_summary(frame))
+            step(advance=1)
+        summary = _summary(adc, used, records)
+        runs.write_json(partial / "summary.json", summary)
+        _write_config(partial / "config.yaml", adc, used, layout, level)
+    if json_:
+        print_json(summary)
+    else:
+        from .report import show_run
+
+        show_run(summary)
+        say(f"{folder}: written")
+    return 0
+
+
+def _summary(adc: Path, used: RadarProfile, records: list[dict[str, Any]]) -> dict[str, Any]:
+    from . import _version
+
+    radar = {"name": used.name, "profile": used.name, "frames": records}
+    return {"version": _version(), "source": str(adc), "backend": None, "seed": None, "radars": [radar]}
+
+
+def _frame(cube: AdcCube, index: int) -> ProcessedFrame:
+    from ..dsp import detect
+    from ..dsp import process as transform
+
+    settings = cube.profile.processing
+    spectrum = transform(cube, range_window=settings.range_window, doppler_window=settings.doppler_window)
+    found = detect(spectrum, pfa=settings.pfa, blanking_m=settings.blanking_m)
+    return ProcessedFrame(cube, spectrum, found, index, returns=cube.returns)
+
+
+def _read(
+    path: Path, name: str | None, overrides: Overrides, layout: LayoutName, level: LevelName | None
+) -> list[AdcCube]:
+    """Return the frames of a file of any of the three kinds."""
+    if not path.is_file():
+        raise NotFoundError(f"{path}: no such file")
+    if path.suffix == ".npz":
+        return [_own_cube(path, name, overrides)]
+    if path.suffix not in (".npy", ".bin"):
+        raise InputError(f"{path}: ADC data end in .npz (own), .npy (plain array) or .bin (DCA1000 capture)")
+    from ..config.profile import load_profile
+    from ..io.captures import count_scale, noise_floor_scale, read_dca1000, read_npy
+
+    if name is None:
+        raise InputError(f"{path}: --profile is needed, the file does not say which radar made it")
+    used = override_profile(load_profile(name), overrides.profile)
+    if level is None:
+        counts = path.suffix == ".bin" and used.receiver.full_scale_dbm is not None
+        level = "counts" if counts else "noise" if path.suffix == ".bin" else "watts"
+    scale = count_scale(used) if level == "counts" else 1.0
+    if path.suffix == ".npy":
+        cubes = read_npy(path, used, scale=scale)
+    else:
+        cubes = read_dca1000(path, used, layout=layout, scale=scale)
+    if level != "noise":
+        return cubes
+    factor = noise_floor_scale(cubes[0].data, used)
+    return [dataclasses.replace(c, data=c.data * factor) for c in cubes]
+
+
+def _own_cube(path: Path, name: str | None, overrides: Overrides) -> AdcCube:
+    """Read an ``adc.npz``, with the echoes beside it where they are, for the truth of the detections."""
+    from ..returns import Returns
+    from ..synthesis.adc import AdcCube
+
+    cube = AdcCube.load(path)
+    if name is not None and name != cube.profile.name:
+        raise InputError(
+            f"--profile {name}: {path} was made by {cube.profile.name!r}, whose axes it keeps; leave it out"
+        )
+    beside = path.with_name("returns.npz")
+    returns = Returns.load(beside) if path.name == "adc.npz" and beside.is_file() else None
+    return dataclasses.replace(cube, profile=override_profile(cube.profile, overrides.profile), returns=returns)
+
+
+def _write_config(path: Path, adc: Path, used: RadarProfile, layout: str, level: str | None) -> None:
+    import yaml
+
+    source = {"adc": str(adc.resolve()), "layout": layout, "level": level}
+    data = {"process": source, "profile": used.model_dump(mode="json", exclude_none=True)}
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+    path.write_text(f"# Written by shenron-rt process.\n{text}", encoding="utf-8")
