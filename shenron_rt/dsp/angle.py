@@ -74,7 +74,7 @@ def sine_grid(positions_m: ArrayLike, wavelength_m: float) -> FloatArray:
         return np.zeros(1)
     beams = 2 * aperture / wavelength_m + 1
     n = max(64, int(2 ** np.ceil(np.log2(4 * beams))))
-    return (np.arange(n) - n // 2) * (2.0 / n)
+    return np.asarray((np.arange(n) - n // 2) * (2.0 / n), dtype=np.float64)
 
 
 def bartlett(snapshots: ComplexArray, vectors: ComplexArray) -> FloatArray:
@@ -97,7 +97,7 @@ def bartlett(snapshots: ComplexArray, vectors: ComplexArray) -> FloatArray:
 def bartlett_2d(
     snapshots: ComplexArray, positions_m: ArrayLike, wavelength_m: float, sine: ArrayLike, sine_elevation: ArrayLike
 ) -> FloatArray:
-    """Return beamformed power over azimuth and elevation, (..., n_sine, n_sine_elevation); invisible directions are 0."""
+    """Return beamformed power over azimuth and elevation, (..., n_sine, n_sine_elevation); invisible ones 0."""
     s, e = np.meshgrid(np.asarray(sine), np.asarray(sine_elevation), indexing="ij")
     vectors = steering(positions_m, wavelength_m, s, e)
     power = bartlett(snapshots, vectors.reshape(-1, vectors.shape[-1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..errors import InputError
 from .cfar_constants import check_kind, os_rank
 from .cfar_design import CfarWindow, bin_correlation, cfar_multiplier, correlation_reach, training_rows
@@ -55,7 +55,7 @@ def _sliding_sum(x: FloatArray, width: int, axis: int) -> FloatArray:
 
 def _strips(power: FloatArray, shape: CfarWindow) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the sums over the training rows before, after and beside every cell; range is zero beyond its ends."""
-    (train_r, train_d), (guard_r, guard_d) = shape.train, shape.guard
+    (train_r, train_d), (guard_r, _) = shape.train, shape.guard
     reach_r, reach_d = shape.reach
     n_range, n_velocity = power.shape
     wrapped = np.take(power, np.arange(-reach_d, n_velocity + reach_d), axis=1, mode="wrap")
@@ -67,7 +67,7 @@ def _strips(power: FloatArray, shape: CfarWindow) -> tuple[FloatArray, FloatArra
     return before, after, _sliding_sum(both, 2 * guard_r + 1, 0)
 
 
-def _counts(n_range: int, shape: CfarWindow) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _counts(n_range: int, shape: CfarWindow) -> tuple[IntArray, IntArray, IntArray]:
     """Return the number of training cells before, after and beside the cells of every range bin."""
     low, high = training_rows(n_range, shape.reach[0])
     guard = shape.guard[0]
@@ -162,7 +162,7 @@ def cfar_threshold(
         bin_correlation(name, n, padded, 2 * reach + 1)
         for name, n, padded, reach in zip(windows, lengths, n_fft, shape.reach, strict=True)
     ]
-    low, high = (np.asarray(n, dtype=np.int64) for n in training_rows(len(power), shape.reach[0]))
+    low, high = training_rows(len(power), shape.reach[0])
     pairs, which = np.unique(np.sort(np.stack([low, high], axis=1), axis=1), axis=0, return_inverse=True)
     alphas = [cfar_multiplier(kind, shape, int(a), int(b), rho[0], rho[1], channels, float(pfa)) for a, b in pairs]
-    return statistic * np.asarray(alphas)[which.ravel()][:, None]
+    return np.asarray(statistic * np.asarray(alphas)[which.ravel()][:, None], dtype=np.float64)

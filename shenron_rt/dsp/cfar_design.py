@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import gammaincc
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..errors import InputError
 from .cfar_constants import check_kind, os_rank, solve_alpha
 from .windows import window
@@ -54,7 +53,7 @@ class CfarWindow:
         return np.asarray(ring, dtype=np.float64)
 
 
-def training_rows(n_range: int, reach: int) -> tuple[FloatArray, FloatArray]:
+def training_rows(n_range: int, reach: int) -> tuple[IntArray, IntArray]:
     """Return how many rows lie below and above each range bin, at most ``reach``."""
     r = np.arange(n_range)
     return np.minimum(r, reach), np.minimum(n_range - 1 - r, reach)
@@ -101,8 +100,8 @@ def quadratic_pfa(alpha: float, eigenvalues: FloatArray, channels: int) -> float
     return float(math.exp(log_g0 + math.log(float(np.sum(g)))))
 
 
-def _toeplitz(correlation: tuple[float, ...], index: FloatArray) -> FloatArray:
-    return np.asarray(correlation)[np.abs(index[:, None] - index[None]).astype(np.int64)]
+def _toeplitz(correlation: tuple[float, ...], index: IntArray) -> FloatArray:
+    return np.asarray(np.asarray(correlation)[np.abs(index[:, None] - index[None])], dtype=np.float64)
 
 
 @lru_cache(maxsize=256)
@@ -129,7 +128,7 @@ def _simulated_ring(
     for _ in range(channels):
         white = rng.standard_normal((2, _TRIALS, rows, columns))
         power += np.sum((colour_r @ white @ colour_d) ** 2, axis=0)
-    return power / (2 * channels)
+    return np.asarray(power / (2 * channels), dtype=np.float64)
 
 
 def _root(matrix: FloatArray) -> FloatArray:
@@ -184,6 +183,8 @@ def cfar_multiplier(
     if kind == "ca":
         eigenvalues = _eigenvalues(shape, low, high, rho_range, rho_doppler)
         return solve_alpha(lambda alpha: quadratic_pfa(alpha, eigenvalues, channels), pfa)
+    from scipy.special import gammaincc
+
     box = _simulated_ring(shape, rho_range, rho_doppler, channels)
     statistic = _simulated_statistic(kind, shape, low, high, box)
     return solve_alpha(lambda alpha: float(np.mean(gammaincc(channels, channels * alpha * statistic))), pfa)

@@ -15,6 +15,7 @@ from ..constants import SPEED_OF_LIGHT
 from ..errors import InputError
 from ..io.npz import load_npz, save_npz
 from . import angle
+from .multiplex import LoopCode
 from .spectra import doppler_spectrum, range_spectrum
 from .windows import window
 
@@ -36,8 +37,8 @@ class RadarCube:
     Parameters
     ----------
     data : (n_range, n_velocity, n_virtual) complex
-        sqrt(W); a bin-centred tone of power P reads abs(data)**2 = P. Channels refer to one time (TDM compensated with
-        the velocity of the bin).
+        sqrt(W); a bin-centred tone of power P reads abs(data)**2 = P. Channels refer to one time (TDM compensated, BPM
+        decoded with the velocity of the bin).
     profile : RadarProfile
         The radar.
     range_window, doppler_window : str
@@ -82,7 +83,7 @@ class RadarCube:
     @property
     def range_m(self) -> FloatArray:
         """(n_range,) bin r is r c / 2B of a still target [m]."""
-        return np.arange(self.data.shape[0]) * self.range_step_m
+        return np.asarray(np.arange(self.data.shape[0]) * self.range_step_m, dtype=np.float64)
 
     @property
     def velocity_step_mps(self) -> float:
@@ -92,7 +93,8 @@ class RadarCube:
     @property
     def velocity_mps(self) -> FloatArray:
         """(n_velocity,) ascending range rate, positive = receding [m/s]."""
-        return (np.arange(self.n_fft[1]) - self.n_fft[1] // 2) * self.velocity_step_mps
+        bins = np.arange(self.n_fft[1]) - self.n_fft[1] // 2
+        return np.asarray(bins * self.velocity_step_mps, dtype=np.float64)
 
     @cached_property
     def azimuth_channels(self) -> IntArray:
@@ -108,6 +110,11 @@ class RadarCube:
     def azimuth_rad(self) -> FloatArray:
         """(n_azimuth,) ascending azimuth, uniform in its sine, positive = left [rad]."""
         return np.arcsin(self.azimuth_sine)
+
+    @cached_property
+    def loop_code(self) -> LoopCode | None:
+        """Signs and times of the chirps of a loop under BPM, else None."""
+        return _loop_code(self.profile, self.n_fft[1])
 
     # ---- levels and maps
     @cached_property
@@ -127,9 +134,8 @@ class RadarCube:
     def range_doppler(self) -> FloatArray:
         """(n_range, n_velocity) power, mean over the channels [W]."""
         x = self.data
-        return (
-            np.asarray(np.einsum("rvc,rvc->rv", x.real, x.real) + np.einsum("rvc,rvc->rv", x.imag, x.imag)) / x.shape[2]
-        )
+        power = np.einsum("rvc,rvc->rv", x.real, x.real) + np.einsum("rvc,rvc->rv", x.imag, x.imag)
+        return np.asarray(power / x.shape[2], dtype=np.float64)
 
     @cached_property
     def range_azimuth(self) -> FloatArray:
@@ -150,8 +156,8 @@ class RadarCube:
     # ---- files
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save data, axes, maps and the whole profile to an ``.npz`` file; keys are the attribute names."""
-        names = ("data", "range_m", "velocity_mps", "azimuth_rad", "range_doppler", "range_azimuth")
-        names += ("range_window", "doppler_window", "n_fft", "noise_added", "noise_power_w")
+        names = ["data", "range_m", "velocity_mps", "azimuth_rad", "range_doppler", "range_azimuth"]
+        names += ["range_window", "doppler_window", "n_fft", "noise_added", "noise_power_w"]
         arrays: dict[str, Any] = {name: getattr(self, name) for name in names}
         save_npz(path, arrays | {"profile": self.profile.model_dump_json()})
 
@@ -179,6 +185,16 @@ class RadarCube:
 def bartlett_max(snapshots: ComplexArray, vectors: ComplexArray) -> FloatArray:
     """Return the beamformed power of (n_range, n_velocity, n) snapshots, maximum over velocity."""
     return np.asarray(angle.bartlett(snapshots, vectors).max(axis=1), dtype=np.float64)
+
+
+def _loop_code(profile: RadarProfile, n_fft: int) -> LoopCode | None:
+    if profile.array.multiplex != "bpm":
+        return None
+    from ..synthesis.signal import hadamard
+
+    starts = profile.raw_chirp_start_s
+    offset = (starts - starts.mean(axis=1, keepdims=True)).mean(axis=0)
+    return LoopCode(hadamard(profile.n_tx), offset, 1 / (n_fft * profile.loop_period_s))
 
 
 def process(
@@ -224,6 +240,9 @@ def process(
         chirp_start_s=adc.chirp_start_s,
         loop_period_s=profile.loop_period_s,
     )
+    code = _loop_code(profile, lengths[1])
+    if code is not None:
+        data = code.decode_anew(data, (np.arange(lengths[1]) - lengths[1] // 2).astype(np.float64))
     return RadarCube(
         data=data,
         profile=profile,

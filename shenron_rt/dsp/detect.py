@@ -13,7 +13,7 @@ from ..errors import InputError
 from . import angle
 from .cfar import cfar_threshold, default_window
 from .detections import DETECTION_DTYPE, Detections
-from .refine import Axis, PeakFit, PeakPatch, fit_peaks
+from .refine import Axis, Elements, PeakFit, PeakPatch, at_peak, fit_peaks, without
 from .spectra import slow_time_offsets
 from .truth import Attribution, attribute
 
@@ -24,6 +24,10 @@ __all__ = ["detect", "local_maxima", "noise_threshold"]
 
 #: Elevation beams tried before the fit, across the visible sines.
 _ELEVATION_BEAMS = 33
+#: A second target in one range-Doppler cell: weakest power relative to the first, channels it takes to tell two.
+_SECOND_PART, _CHANNELS_FOR_TWO = 10**-1.2, 4
+#: Gauss-Newton steps of a continued fit, and turns between two targets.
+_SHORT, _TURNS = 2, 3
 
 
 def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> FloatArray:
@@ -103,10 +107,11 @@ def detect(
     if not blanking_m >= 0:
         raise InputError(f"detect: blanking_m must be >= 0, got {blanking_m}")
     power = cube.range_doppler
-    hits = power > noise_threshold(cube, pfa=pfa, cfar=cfar)
+    threshold = noise_threshold(cube, pfa=pfa, cfar=cfar)
+    hits = power > threshold
     hits &= (cube.range_m >= blanking_m)[:, None]
     row, column = np.nonzero(hits & local_maxima(power))
-    peaks = _estimate(cube, row, column)
+    peaks = _estimate(cube, row, column, threshold)
     table = _table(cube, peaks)
     table = table[table["range"] > 0]
     return Detections(table[np.argsort(-table["power"], kind="stable")], int(hits.sum()))
@@ -134,21 +139,60 @@ def _axes(cube: RadarCube) -> tuple[Axis, Axis]:
     return axes[0], axes[1]
 
 
-def _estimate(cube: RadarCube, row: IntArray, column: IntArray) -> _Peaks:
-    """Fit one point target to every peak cell."""
+def _estimate(cube: RadarCube, row: IntArray, column: IntArray, threshold: FloatArray) -> _Peaks:
+    """Fit one point target to every peak cell, and a second one where another direction stands out clearly."""
     p = cube.profile
-    sine, elevation = _coarse_direction(cube, cube.data[row, column])
+    elements = Elements(p.tx_m, p.rx_m, p.wavelength_m, cube.range_step_m)
+    base = row * cube.range_step_m - _coupling_m(cube, column - cube.n_fft[1] // 2)
     turn = 2 * np.pi * slow_time_offsets(p.chirp_start_s) / (cube.n_fft[1] * p.loop_period_s)
-    patch = PeakPatch.cut(cube.data, row, column, *_axes(cube), turn)
-    fit = fit_peaks(
+    code = cube.loop_code
+    sine, elevation = _coarse_direction(cube, cube.data[row, column])
+    axes = _axes(cube)
+    patch = PeakPatch.cut(cube.data, row, column, axes, turn, code)
+    fit = fit_peaks(patch, elements, base, sine=sine, sine_elevation=elevation)
+    if code is not None:
+        patch = PeakPatch.cut(cube.data, row, column, axes, turn, code, fit.doppler_bin)
+        fit = _refit(patch, elements, base, fit)
+    rest = cube.data[row, column] - at_peak(patch, elements, base, fit)
+    which, sine, elevation = _second_direction(cube, rest, fit, threshold[row, column])
+    if not len(which):
+        return _Peaks(row, column, fit)
+    pair = _fit_pair(patch.part(which), elements, base[which], fit.part(which), sine, elevation)
+    kept = _distinct(cube, *pair)
+    which, pair = which[kept], (pair[0].part(kept), pair[1].part(kept))
+    every = fit.replaced(which, pair[0]).joined(pair[1])
+    return _Peaks(np.concatenate([row, row[which]]), np.concatenate([column, column[which]]), every)
+
+
+def _coupling_m(cube: RadarCube, doppler_bin: FloatArray | IntArray) -> FloatArray:
+    """Return the apparent range that a Doppler shift of so many bins adds, c f_D / 2k [m]."""
+    p = cube.profile
+    doppler_hz = doppler_bin / (cube.n_fft[1] * p.loop_period_s)
+    return np.asarray(doppler_hz * SPEED_OF_LIGHT / (2 * p.slope_hz_per_s), dtype=np.float64)
+
+
+def _refit(patch: PeakPatch, elements: Elements, base_m: FloatArray, fit: PeakFit) -> PeakFit:
+    """Continue a fit on other cells."""
+    return fit_peaks(
         patch,
-        positions_m=p.positions_m,
-        wavelength_m=p.wavelength_m,
-        range_step_m=cube.range_step_m,
-        sine=sine,
-        sine_elevation=elevation,
+        elements,
+        base_m,
+        sine=fit.sine,
+        sine_elevation=fit.sine_elevation,
+        start=(fit.range_bin, fit.doppler_bin),
+        iterations=_SHORT,
     )
-    return _Peaks(row, column, fit)
+
+
+def _fit_pair(
+    patch: PeakPatch, elements: Elements, base_m: FloatArray, first: PeakFit, sine: FloatArray, elevation: FloatArray
+) -> tuple[PeakFit, PeakFit]:
+    """Fit two targets in turn, each to the cells without the other."""
+    second = fit_peaks(without(patch, elements, base_m, first), elements, base_m, sine=sine, sine_elevation=elevation)
+    for _ in range(_TURNS):
+        first = _refit(without(patch, elements, base_m, second), elements, base_m, first)
+        second = _refit(without(patch, elements, base_m, first), elements, base_m, second)
+    return first, second
 
 
 def _coarse_direction(cube: RadarCube, snapshots: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -165,13 +209,46 @@ def _coarse_direction(cube: RadarCube, snapshots: ComplexArray) -> tuple[FloatAr
     return sine, elevation
 
 
+def _second_direction(
+    cube: RadarCube, rest: ComplexArray, fit: PeakFit, threshold: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return peaks whose cell holds another direction when the fitted target is taken out, and that direction.
+
+    It must stand a beam away, above the threshold, and no more than 12 dB below the first: what a line of six leaves
+    of an extended or mismodelled target is weaker.
+    """
+    empty = np.zeros(0)
+    if len(cube.azimuth_channels) < _CHANNELS_FOR_TWO or not len(rest):
+        return np.zeros(0, dtype=np.int64), empty, empty
+    sine, elevation = _coarse_direction(cube, rest)
+    vectors = angle.steering(cube.profile.positions_m, cube.profile.wavelength_m, sine, elevation)
+    power = np.abs(np.einsum("pc,pc->p", vectors.conj(), rest) / rest.shape[1]) ** 2
+    clear = power > np.maximum(threshold, _SECOND_PART * np.abs(fit.amplitude) ** 2)
+    clear &= np.abs(sine - fit.sine) > _beam(cube)
+    which = np.flatnonzero(clear)
+    return which, sine[which], elevation[which]
+
+
+def _beam(cube: RadarCube) -> float:
+    """Return the resolution of the azimuth aperture in sine: 2/M of a half-wavelength line of M columns."""
+    aperture = float(np.ptp(cube.profile.positions_m[cube.azimuth_channels, 1]))
+    return 2 / (2 * aperture / cube.profile.wavelength_m + 1)
+
+
+def _distinct(cube: RadarCube, first: PeakFit, second: PeakFit) -> IntArray:
+    """Return the pairs that stayed a beam apart and did not blow up against each other."""
+    strong, weak = np.abs(first.amplitude) ** 2, np.abs(second.amplitude) ** 2
+    apart = np.abs(first.sine - second.sine) > 0.8 * _beam(cube)
+    return np.flatnonzero(apart & (weak > _SECOND_PART * strong) & (weak < 2 * strong))
+
+
 def _table(cube: RadarCube, peaks: _Peaks) -> np.ndarray[tuple[int], np.dtype[np.void]]:
     """Turn fitted peaks into rows."""
     p = cube.profile
     fit = peaks.fit
     column = peaks.column - cube.n_fft[1] // 2 + fit.doppler_bin
     doppler_hz = column / (cube.n_fft[1] * p.loop_period_s)
-    distance = (peaks.row + fit.range_bin) * cube.range_step_m - doppler_hz * SPEED_OF_LIGHT / (2 * p.slope_hz_per_s)
+    distance = (peaks.row + fit.range_bin) * cube.range_step_m - _coupling_m(cube, column)
     if p.waveform.adc == "complex":
         # beat frequencies are known modulo f_s; a real ADC folds them instead, and what comes out below 0 is no target
         distance = np.where(distance > 0, distance, distance + cube.range_step_m * cube.n_fft[0])
@@ -206,8 +283,7 @@ def _folded(cube: RadarCube, truth: Attribution) -> BoolArray:
 def _snr_db(cube: RadarCube, peaks: _Peaks) -> FloatArray:
     """Return the power of the peak cell, beamformed to the fitted direction, over the expected noise in it [dB]."""
     p = cube.profile
-    vectors = angle.steering(p.positions_m, p.wavelength_m, peaks.fit.sine, peaks.fit.sine_elevation)
-    beams = np.einsum("pc,pc->p", vectors.conj(), cube.data[peaks.row, peaks.column]) / p.n_virtual
+    beams = np.einsum("pc,pc->p", peaks.fit.phasor.conj(), cube.data[peaks.row, peaks.column]) / p.n_virtual
     with np.errstate(divide="ignore"):
         return np.asarray(10 * np.log10(np.abs(beams) ** 2 / (cube.noise_power_w / p.n_virtual)))
 
@@ -221,4 +297,5 @@ def _rcs_dbsm(
     pattern = np.asarray(p.pattern(azimuth, elevation), dtype=np.float64) ** 2
     per_unit = p.tx_power_w * gain * pattern * p.wavelength_m**2 / (FOUR_PI_CUBED * distance**4)
     with np.errstate(divide="ignore"):
-        return np.maximum(10 * np.log10(power / np.maximum(per_unit, 1e-300)), RCS_FLOOR_DBSM)
+        level = 10 * np.log10(power / np.maximum(per_unit, 1e-300))
+    return np.asarray(np.maximum(level, RCS_FLOOR_DBSM), dtype=np.float64)

@@ -7,7 +7,7 @@ import io
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import IO, TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -153,7 +153,11 @@ class Detections:
         writer.writerow(DETECTION_DTYPE.names or ())
         for row in self.table.tolist():
             writer.writerow([int(v) if isinstance(v, bool) else repr(v) for v in row])
-        return atomic_write(path, lambda file: file.write(text.getvalue().encode()) and None)
+
+        def write(file: IO[bytes]) -> None:
+            file.write(text.getvalue().encode())
+
+        return atomic_write(path, write)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the table; the same as :meth:`to_csv`."""

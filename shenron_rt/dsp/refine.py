@@ -10,16 +10,17 @@ their covariance, so that the weight stays on the main lobe, where a second targ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 
 import numpy as np
 
 from .._typing import ComplexArray, FloatArray, IntArray
 from .cfar_design import bin_correlation
+from .multiplex import LoopCode
 from .windows import window
 
-__all__ = ["Axis", "PeakFit", "PeakPatch", "fit_peaks"]
+__all__ = ["Axis", "Elements", "PeakFit", "PeakPatch", "at_peak", "fit_peaks", "without"]
 
 #: Points of the response table per bin; cubic Hermite between them errs by 1e-8.
 _TABLE_STEP = 64
@@ -102,13 +103,22 @@ class PeakPatch:
 
     @classmethod
     def cut(
-        cls, data: ComplexArray, row: IntArray, column: IntArray, range_axis: Axis, doppler_axis: Axis, turn: FloatArray
+        cls,
+        data: ComplexArray,
+        row: IntArray,
+        column: IntArray,
+        axes: tuple[Axis, Axis],
+        turn: FloatArray,
+        code: LoopCode | None = None,
+        doppler_bin: FloatArray | None = None,
     ) -> PeakPatch:
         """Cut the cells around peaks out of a cube; at the ends of range the patch moves inside, Doppler wraps.
 
         ``turn`` undoes the compensation of each Doppler bin by its own velocity: the cells of one peak then share the
-        time reference of its middle bin.
+        time reference of its middle bin. Under BPM ``code`` decodes them anew for the Doppler of the peak itself,
+        ``doppler_bin`` from its middle bin.
         """
+        range_axis, doppler_axis = axes
         n_range, n_velocity, _ = data.shape
         half = range_axis.half * range_axis.stride
         middle = np.clip(row, half, n_range - 1 - half)
@@ -121,8 +131,11 @@ class PeakPatch:
         phase_r = np.exp(2j * np.pi * range_axis.centre / range_axis.n_fft * row_offset)
         phase_d = np.exp(2j * np.pi * doppler_axis.centre / doppler_axis.n_fft * j)
         # beyond the end of the Doppler axis the compensation was that of the wrapped bin
-        compensated = np.exp(1j * (columns - column[:, None])[:, :, None] * turn)
-        cells = cells * phase_r[:, :, None, None] * (phase_d[:, None] * compensated)[:, None]
+        own = (columns - column[:, None]).astype(np.float64)
+        cells = cells * phase_r[:, :, None, None] * (phase_d[:, None] * np.exp(1j * own[:, :, None] * turn))[:, None]
+        if code is not None:
+            wanted = np.zeros(len(row)) if doppler_bin is None else doppler_bin
+            cells = code.decode_anew(cells, (wanted[:, None] - own)[:, None])
         cells = np.einsum("ik,pkjc,jl->pilc", _whitener(range_axis), cells, _whitener(doppler_axis), optimize=True)
         return cls(cells, row_offset, j, range_axis, doppler_axis, turn)
 
@@ -135,67 +148,112 @@ class PeakPatch:
 
 @dataclass(frozen=True)
 class PeakFit:
-    """Estimates: offsets from the peak cell [bins], direction cosines (y, z), complex amplitude per channel."""
+    """Estimates: offsets from the peak cell [bins], direction cosines (y, z), complex amplitude per channel, steering.
+
+    ``phasor`` (n_peak, n_virtual) is what a target there leaves on the channels, wave front curvature included.
+    """
 
     range_bin: FloatArray
     doppler_bin: FloatArray
     sine: FloatArray
     sine_elevation: FloatArray
     amplitude: ComplexArray
+    phasor: ComplexArray
+
+    def part(self, which: IntArray) -> PeakFit:
+        """Return the fits of some peaks."""
+        return PeakFit(*(getattr(self, f.name)[which] for f in fields(self)))
+
+    def joined(self, other: PeakFit) -> PeakFit:
+        """Return these fits followed by others."""
+        return PeakFit(*(np.concatenate([getattr(v, f.name) for v in (self, other)]) for f in fields(self)))
+
+    def replaced(self, which: IntArray, new: PeakFit) -> PeakFit:
+        """Return these fits with some of them exchanged."""
+        columns = {f.name: getattr(self, f.name).copy() for f in fields(self)}
+        for name, column in columns.items():
+            column[which] = getattr(new, name)
+        return PeakFit(**columns)
 
 
 @dataclass(frozen=True)
-class _Geometry:
-    """What the array contributes: phase per unit direction cosine, range shift per unit, in bins."""
+class Elements:
+    """The array and the scales that tie it to the cells.
 
-    positions: FloatArray
-    wavenumber: float
-    bins_per_metre: float
-    free: tuple[bool, bool]
+    ``tx_m``, ``rx_m`` (n, 3) elements [m]; ``wavelength_m`` at f_c; ``range_step_m`` of a bin.
+    """
 
-    def phasor(self, sine: FloatArray, elevation: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        """Return (n_peak, n_virtual) steering phasors and range shifts [bins] of a far target."""
+    tx_m: FloatArray
+    rx_m: FloatArray
+    wavelength_m: float
+    range_step_m: float
+
+    @property
+    def positions(self) -> FloatArray:
+        """(n_virtual, 3) tx + rx positions [m]."""
+        return np.asarray((self.tx_m[:, None] + self.rx_m[None]).reshape(-1, 3))
+
+    @property
+    def free(self) -> tuple[bool, bool]:
+        """Whether the array has an aperture in azimuth and in elevation."""
+        spans = np.ptp(self.positions, axis=0)
+        return bool(spans[1] > 1e-3 * self.wavelength_m), bool(spans[2] > 1e-3 * self.wavelength_m)
+
+    def phasor(self, distance: FloatArray, sine: FloatArray, elevation: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Return (n_peak, n_virtual) phasors and range shifts [bins] of a target at a distance [m] and direction.
+
+        |p - a| - |p| = (a.a - 2 p.a) / (|p - a| + |p|) element by element: exact, without a difference of ranges.
+        """
         forward = np.sqrt(np.maximum(1 - sine**2 - elevation**2, 0.0))
-        path = np.stack([forward, sine, elevation], axis=1) @ self.positions.T
-        return np.exp(-1j * self.wavenumber * path), -path / 2 * self.bins_per_metre
+        target = np.maximum(distance, 1e-3)[:, None] * np.stack([forward, sine, elevation], axis=1)
+        legs = []
+        for element in (self.tx_m, self.rx_m):
+            to_element = np.linalg.norm(target[:, None] - element, axis=2)
+            excess = np.sum(element**2, axis=1) - 2 * target @ element.T
+            legs.append(excess / (to_element + np.linalg.norm(target, axis=1)[:, None]))
+        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), -1)
+        phasor = np.exp(2j * np.pi / self.wavelength_m * path)
+        return np.asarray(phasor, dtype=np.complex128), path / (2 * self.range_step_m)
 
     def slopes(self, sine: FloatArray, elevation: FloatArray) -> list[FloatArray]:
-        """Return d phase / d cosine, one (n_peak, n_virtual) array per free direction cosine."""
+        """Return d phase / d cosine of a far target, one (n_peak, n_virtual) array per free direction cosine."""
+        positions = self.positions
         forward = np.sqrt(np.maximum(1 - sine**2 - elevation**2, 1e-4))
         out = []
         for axis, cosine, free in ((1, sine, self.free[0]), (2, elevation, self.free[1])):
             if free:
-                lever = self.positions[:, axis] - (cosine / forward)[:, None] * self.positions[:, 0]
-                out.append(-self.wavenumber * lever)
+                lever = positions[:, axis] - (cosine / forward)[:, None] * positions[:, 0]
+                out.append(-2 * np.pi / self.wavelength_m * lever)
         return out
 
 
 def _model(
-    patch: PeakPatch, geometry: _Geometry, f: FloatArray, d: FloatArray, s: FloatArray, e: FloatArray
-) -> tuple[FloatArray, FloatArray, ComplexArray, ComplexArray, ComplexArray]:
+    patch: PeakPatch, elements: Elements, base_m: FloatArray, f: FloatArray, d: FloatArray, s: FloatArray, e: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, ComplexArray]:
     """Return whitened range response and slope (p, i, c), Doppler response and slope (p, j), channel phasor (p, c)."""
-    phasor, shift = geometry.phasor(s, e)
+    phasor, shift = elements.phasor(base_m + f * elements.range_step_m, s, e)
     reach_r = 2 * patch.range_axis.half * patch.range_axis.stride + 4
     reach_d = 2 * patch.doppler_axis.half * patch.doppler_axis.stride + 4
     x_r = (f[:, None] + shift)[:, None, :] - patch.row_offset[:, :, None]
     white_r, white_d = _whitener(patch.range_axis), _whitener(patch.doppler_axis)
-    m_r, dm_r = (np.matmul(white_r, v) for v in _response(patch.range_axis, x_r, reach_r))
-    m_d, dm_d = (v @ white_d for v in _response(patch.doppler_axis, d[:, None] - patch.column_offset, reach_d))
-    return m_r, dm_r, m_d, dm_d, phasor * np.exp(1j * d[:, None] * patch.turn)
+    m_r, dm_r = _response(patch.range_axis, x_r, reach_r)
+    m_d, dm_d = _response(patch.doppler_axis, d[:, None] - patch.column_offset, reach_d)
+    turned = np.asarray(phasor * np.exp(1j * d[:, None] * patch.turn), dtype=np.complex128)
+    return np.matmul(white_r, m_r), np.matmul(white_r, dm_r), m_d @ white_d, dm_d @ white_d, turned
 
 
 def _step(
-    patch: PeakPatch, geometry: _Geometry, f: FloatArray, d: FloatArray, s: FloatArray, e: FloatArray
+    patch: PeakPatch, elements: Elements, base_m: FloatArray, f: FloatArray, d: FloatArray, s: FloatArray, e: FloatArray
 ) -> tuple[FloatArray, ComplexArray]:
     """Return the Gauss-Newton step (n_peak, n_parameter) and the amplitude at the present estimate."""
-    m_r, dm_r, m_d, dm_d, phasor = _model(patch, geometry, f, d, s, e)
+    m_r, dm_r, m_d, dm_d, phasor = _model(patch, elements, base_m, f, d, s, e)
     by_doppler = np.einsum("pijc,pj->pic", patch.cells, m_d)
     z = phasor.conj() * np.einsum("pic,pic->pc", m_r, by_doppler)
     z_r = phasor.conj() * np.einsum("pic,pic->pc", dm_r, by_doppler)
     z_d = phasor.conj() * np.einsum("pic,pic->pc", m_r, np.einsum("pijc,pj->pic", patch.cells, dm_d))
     alpha, beta, gamma = (np.einsum("pic,pic->pc", a, b) for a, b in ((m_r, m_r), (m_r, dm_r), (dm_r, dm_r)))
     a, b, g = ((u * v).sum(axis=1, keepdims=True) for u, v in ((m_d, m_d), (m_d, dm_d), (dm_d, dm_d)))
-    slopes = geometry.slopes(s, e)
+    slopes = elements.slopes(s, e)
     # every derivative of the model is (real factor along range or Doppler) or (j lever) times the model
     lever = [np.broadcast_to(patch.turn, z.shape), *slopes]
     projections = [z_r, z_d - 1j * lever[0] * z, *(-1j * h * z for h in slopes)]
@@ -219,56 +277,70 @@ def _step(
     # a trace of damping keeps an empty patch solvable
     scale = np.trace(matrix, axis1=1, axis2=2) + np.finfo(float).tiny
     matrix += (1e-12 * scale)[:, None, None] * np.eye(count)
-    return np.linalg.solve(matrix, vector[:, :, None])[:, :, 0], amplitude
+    return np.asarray(np.linalg.solve(matrix, vector[:, :, None])[:, :, 0], dtype=np.float64), amplitude
 
 
 def fit_peaks(
     patch: PeakPatch,
+    elements: Elements,
+    base_m: FloatArray,
     *,
-    positions_m: FloatArray,
-    wavelength_m: float,
-    range_step_m: float,
     sine: FloatArray,
     sine_elevation: FloatArray,
     start: tuple[FloatArray, FloatArray] | None = None,
+    iterations: int = _ITERATIONS,
 ) -> PeakFit:
     """Fit one point target to every patch.
 
     Parameters
     ----------
     patch : PeakPatch
-    positions_m : (n_virtual, 3) float
-        tx + rx positions [m].
-    wavelength_m, range_step_m : float
-        Wavelength at f_c and range of one bin [m].
+    elements : Elements
+    base_m : (n_peak,) float
+        Distance of the peak cell, its range-Doppler coupling removed [m]; sets the curvature of the wave front.
     sine, sine_elevation : (n_peak,) float
         Direction cosines to start from.
     start : pair of (n_peak,) float, optional
         Offsets in range and Doppler to start from [bins]; the peak cell by default.
+    iterations : int
+        Gauss-Newton steps.
     """
-    spans = np.ptp(positions_m, axis=0)
-    geometry = _Geometry(
-        positions_m,
-        2 * np.pi / wavelength_m,
-        1.0 / range_step_m,
-        (bool(spans[1] > 1e-3 * wavelength_m), bool(spans[2] > 1e-3 * wavelength_m)),
-    )
+    spans = np.ptp(elements.positions, axis=0)
     limits = [_STEP_BINS * patch.range_axis.stride, _STEP_BINS * patch.doppler_axis.stride]
-    limits += [_STEP_BEAMS * wavelength_m / spans[k] for k in (1, 2) if geometry.free[k - 1]]
+    limits += [_STEP_BEAMS * elements.wavelength_m / spans[k] for k in (1, 2) if elements.free[k - 1]]
     bound = np.array([_LIMIT_BINS * patch.range_axis.stride, _LIMIT_BINS * patch.doppler_axis.stride])
     s, e = sine.copy(), sine_elevation.copy()
-    middle = geometry.phasor(s, e)[1].mean(axis=1)
+    middle = elements.phasor(base_m, s, e)[1].mean(axis=1)
     f, d = (-middle, np.zeros(len(s))) if start is None else start
-    for _ in range(_ITERATIONS):
-        step, _ = _step(patch, geometry, f, d, s, e)
+    for _ in range(iterations):
+        step, _ = _step(patch, elements, base_m, f, d, s, e)
         step = np.clip(step, -np.asarray(limits), np.asarray(limits))
         # f refers to the origin of the array, the peak to its middle: the limit is about the peak
         f = np.clip(f + step[:, 0], -bound[0] - middle, bound[0] - middle)
         d = np.clip(d + step[:, 1], -bound[1], bound[1])
-        if geometry.free[0]:
+        if elements.free[0]:
             s = np.clip(s + step[:, 2], -1.0, 1.0)
-        if geometry.free[1]:
+        if elements.free[1]:
             top = np.sqrt(1 - s**2)
             e = np.clip(e + step[:, -1], -top, top)
-    _, amplitude = _step(patch, geometry, f, d, s, e)
-    return PeakFit(f, d, s, e, amplitude)
+    _, amplitude = _step(patch, elements, base_m, f, d, s, e)
+    phasor, _ = elements.phasor(base_m + f * elements.range_step_m, s, e)
+    return PeakFit(f, d, s, e, amplitude, phasor)
+
+
+def without(patch: PeakPatch, elements: Elements, base_m: FloatArray, fit: PeakFit) -> PeakPatch:
+    """Return the patches with the fitted targets taken out."""
+    m_r, _, m_d, _, phasor = _model(
+        patch, elements, base_m, fit.range_bin, fit.doppler_bin, fit.sine, fit.sine_elevation
+    )
+    model = (fit.amplitude[:, None] * phasor)[:, None, None] * m_r[:, :, None] * m_d[:, None, :, None]
+    return replace(patch, cells=patch.cells - model)
+
+
+def at_peak(patch: PeakPatch, elements: Elements, base_m: FloatArray, fit: PeakFit) -> ComplexArray:
+    """Return what the fitted targets leave in their peak cells, (n_peak, n_virtual) [sqrt(W)]."""
+    _, shift = elements.phasor(base_m + fit.range_bin * elements.range_step_m, fit.sine, fit.sine_elevation)
+    gain_r, _ = _response(patch.range_axis, fit.range_bin[:, None] + shift, 4)
+    gain_d, _ = _response(patch.doppler_axis, fit.doppler_bin, 4)
+    turned = fit.phasor * np.exp(1j * fit.doppler_bin[:, None] * patch.turn)
+    return np.asarray((fit.amplitude * gain_d)[:, None] * gain_r * turned, dtype=np.complex128)

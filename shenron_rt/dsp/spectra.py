@@ -41,8 +41,8 @@ def range_spectrum(samples: ComplexArray, *, name: str, n_fft: int, real: bool) 
 
 def slow_time_offsets(chirp_start_s: FloatArray) -> FloatArray:
     """Return how much later than the mean channel each channel's chirps start [s], shape (n_virtual,)."""
-    mean: FloatArray = chirp_start_s.mean(axis=0)
-    return mean - mean.mean()
+    mean = chirp_start_s.mean(axis=0)
+    return np.asarray(mean - mean.mean(), dtype=np.float64)
 
 
 def is_uniform(chirp_start_s: FloatArray) -> bool:

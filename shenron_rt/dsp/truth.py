@@ -26,7 +26,7 @@ _TABLE_STEP = 32
 
 @dataclass(frozen=True)
 class Attribution:
-    """Truth of every detection: object, its tag, its power in the cell [W], its velocity [m/s]; -1, 0, 0, NaN where none."""
+    """Truth of every detection: object, tag, power in the cell [W], velocity [m/s]; -1, 0, 0, NaN where none."""
 
     object_id: IntArray
     tag: IntArray
@@ -170,7 +170,7 @@ def _array_response(centred: FloatArray, wavelength_m: float, ds: FloatArray, de
         return np.asarray(np.interp(ds, x, table))
     for (y, z), times in zip(columns, count, strict=True):
         out += times * np.cos(2 * np.pi / wavelength_m * (y * ds + z * de))
-    return out / count.sum()
+    return np.asarray(out / count.sum(), dtype=np.float64)
 
 
 def _strongest(

@@ -14,9 +14,9 @@ from ..errors import InputError, did_you_mean
 __all__ = ["WINDOWS", "WindowFigures", "window", "window_figures"]
 
 #: Side-lobe level of the Taylor window [dB] and its number of nearly constant side lobes.
-TAYLOR_SLL_DB, TAYLOR_NBAR = 35.0, 4
+TAYLOR_SLL_DB, TAYLOR_NBAR = 35, 4
 #: Side-lobe level of the Dolph-Chebyshev window [dB].
-CHEBYSHEV_SLL_DB = 80.0
+CHEBYSHEV_SLL_DB = 80
 #: Zero padding behind the figures of merit; widths and peaks are read off this grid.
 _PADDING = 512
 
