@@ -1,7 +1,7 @@
 """Physical optics on the flat facets of a mesh, written apart from the package: the tests' independent yardstick.
 
-Each triangle's phase is taken as linear about its centroid and integrated in closed form; the wave is spherical from the
-radar's position; facets seen from behind or hidden (their centroid is) do not count. e^{+jwt}, metal plate facing the
+Each triangle's phase is taken as linear about its centroid and integrated in closed form; the wave is spherical from
+the radar's position; facets seen from behind or hidden (their centroid is) do not count. e^{+jwt}, metal plate facing the
 radar: positive real.
 """
 

@@ -10,7 +10,9 @@ from ..mesh import Part, TaggedMesh
 from . import canonical, people, road, vegetation
 from ._piece import Piece
 from ._text import Recipe, parse
+from .bicycle import bicycle
 from .car import car
+from .truck import truck
 
 __all__ = ["SHAPES", "make_shape"]
 
@@ -29,6 +31,8 @@ SHAPES: dict[str, Recipe] = {
     "guard_rail": Recipe(road.guard_rail, (), {"l": 20.0, "h": 0.75}),
     "tree": Recipe(vegetation.tree, (), {"h": 8.0, "crown": math.nan}),
     "car": Recipe(car),
+    "truck": Recipe(truck),
+    "bicycle": Recipe(bicycle),
     "pedestrian": Recipe(people.pedestrian, (), {"h": 1.75, "stride": 0.6}),
 }
 

@@ -77,7 +77,8 @@ def upper_edge(x: FloatArray) -> FloatArray:
 def lower_edge(x: FloatArray) -> FloatArray:
     """Height of the sill and of the wheel arches [m]."""
     reach = np.min([np.abs(x - axle) for axle in AXLES], axis=0) / _ARCH_HALF_LENGTH
-    return _CLEARANCE + (_ARCH_TOP - _CLEARANCE) * np.sqrt(np.clip(1.0 - reach**3, 0.0, None))
+    height: FloatArray = _CLEARANCE + (_ARCH_TOP - _CLEARANCE) * np.sqrt(np.clip(1.0 - reach**3, 0.0, None))
+    return height
 
 
 def tuck(height: FloatArray, x: FloatArray) -> FloatArray:

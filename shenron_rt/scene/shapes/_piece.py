@@ -23,6 +23,7 @@ __all__ = [
     "revolve",
     "segments",
     "tube",
+    "weld",
 ]
 
 #: Largest distance between a facet and the curved surface it stands for [m]: a 600th of the wavelength at 77 GHz. Its
@@ -138,7 +139,7 @@ def revolve(profile: ArrayLike, n: int) -> tuple[FloatArray, IntArray]:
     unit = polygon(1.0, n)
     ring = np.broadcast_to(unit, (len(curve), n, 2)) * curve[:, :1, None]
     height = np.broadcast_to(curve[:, 1, None, None], (len(curve), n, 1))
-    return _weld(*grid(np.concatenate([ring, height], axis=2), wrap=True))
+    return weld(*grid(np.concatenate([ring, height], axis=2), wrap=True))
 
 
 def tube(path: ArrayLike, radius: ArrayLike, n: int) -> tuple[FloatArray, IntArray]:
@@ -165,7 +166,7 @@ def tube(path: ArrayLike, radius: ArrayLike, n: int) -> tuple[FloatArray, IntArr
     unit = polygon(1.0, n)
     ring = centre[:, None] + r[:, None, None] * (unit[:, :1] * side[:, None] + unit[:, 1:] * up[:, None])
     first, last = np.repeat(centre[None, :1], n, axis=1), np.repeat(centre[None, -1:], n, axis=1)
-    return _weld(*grid(np.concatenate([first, ring, last]), wrap=True))
+    return weld(*grid(np.concatenate([first, ring, last]), wrap=True))
 
 
 def box(length: float, width: float, height: float) -> tuple[FloatArray, IntArray]:
@@ -214,7 +215,7 @@ def geodesic(frequency: int) -> tuple[FloatArray, IntArray]:
     points = np.einsum("tk,fkc->ftc", weights, corners[base])
     points /= np.linalg.norm(points, axis=2, keepdims=True)
     faces = (local[None] + len(i) * np.arange(20)[:, None, None]).reshape(-1, 3)
-    vertices, welded = _weld(points.reshape(-1, 3), faces.astype(np.int32))
+    vertices, welded = weld(points.reshape(-1, 3), faces.astype(np.int32))
     p, q, r = (vertices[welded[:, k]] for k in range(3))
     volume = np.einsum("ij,ij->i", p, np.cross(q, r)).sum() / 6.0
     return vertices * (4.0 * np.pi / 3.0 / volume) ** (1.0 / 3.0), welded
@@ -227,7 +228,7 @@ def ellipsoid(semi_axes: ArrayLike, frequency: int, centre: ArrayLike = (0.0, 0.
     return vertices * np.asarray(semi_axes, dtype=np.float64) + np.asarray(centre, dtype=np.float64), faces
 
 
-def _weld(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+def weld(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge vertices closer than a billionth of the extent; order of first appearance by position."""
     extent = float(np.ptp(vertices, axis=0).max())
     cell = np.round(vertices / (1e-9 * extent)) + 0.0

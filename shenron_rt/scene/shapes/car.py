@@ -1,6 +1,6 @@
 """A car, 4.5 x 1.8 x 1.45 m, whose echo at 77 GHz has the level and the flashes measured on real ones.
 
-It is a shape of its own, no model of a product. Radii of curvature are what decides the echo; docs/car-rcs.md shows how.
+It is a shape of its own, no model of a product. Radii of curvature decide its echo; docs/car-rcs.md shows how.
 """
 
 from __future__ import annotations
