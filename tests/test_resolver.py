@@ -16,7 +16,7 @@ from shenron_rt.errors import ConfigError, InputError, NotFoundError
 from shenron_rt.resources import package_folder
 from shenron_rt.scene.lexicon import _MATERIAL_PHRASES, split_words
 from shenron_rt.scene.mesh import Part, TaggedMesh, build_mesh
-from shenron_rt.scene.resolver import coverage, resolution_table, resolve_tags
+from shenron_rt.scene.resolver import coverage, load_tagged_mesh, resolution_table, resolve_tags
 from shenron_rt.scene.resolver_manifest import TagManifest, load_manifest
 from shenron_rt.scene.resolver_names import classify_name, join_key
 from shenron_rt.tags import SemanticTag, parse_tag
@@ -273,6 +273,30 @@ def test_manifest_frame_is_checked(tmp_path) -> None:
     file.write_text("version: 1\nframe: {preset: carla}\n")
     with pytest.raises(ConfigError, match="unknown mesh_frame 'carla'"):
         load_manifest(file)
+
+
+def test_manifest_frame_is_used_unless_the_caller_names_one(tmp_path) -> None:
+    mesh_file = tmp_path / "wall.obj"
+    mesh_file.write_text("v 100 0 0\nv 100 200 0\nv 100 0 300\nf 1 2 3\n")  # y up, cm
+    manifest = tmp_path / "wall.yaml"
+    manifest.write_text("version: 1\nframe: {preset: ue_obj_cm}\n")
+    assert load_tagged_mesh(mesh_file, manifest=manifest).bounds.tolist() == [[1, -3, 0], [1, 0, 2]]
+    explicit = load_tagged_mesh(mesh_file, manifest=manifest, mesh_frame="ros_z_up", units="cm")
+    assert explicit.bounds.tolist() == [[1, 0, 0], [1, 2, 3]]
+    assert load_tagged_mesh(mesh_file).bounds.tolist() == [[100, 0, 0], [100, 200, 300]]
+
+
+def test_tags_given_by_the_program_stay_and_resolving_twice_changes_nothing() -> None:
+    mesh = strips(
+        Part(object="hull", tag=SemanticTag.Truck, em_material="metal"), Part(object="Plane"), Part(object="SM_Sign")
+    )
+    once = resolve_tags(mesh, unlabelled="warn")
+    assert [(p.tag.name, p.em_material) for p in once.parts] == [
+        ("Truck", "metal"), ("Unlabeled", "concrete"), ("TrafficSigns", None),
+    ]  # fmt: skip
+    assert resolve_tags(once, unlabelled="warn").parts == once.parts
+    with pytest.raises(InputError, match="'Plane'"):
+        resolve_tags(once)
 
 
 # --- policy

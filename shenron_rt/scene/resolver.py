@@ -15,12 +15,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .._typing import ArrayLike
 from ..errors import InputError
 from ..tags import SemanticTag, TagTable, parse_tag, tag_table
 from .lexicon import find_material
 from .mesh import Part, TaggedMesh
+from .readers import read_mesh
 from .resolver_dump import EnvironmentObjects, read_environment_objects
-from .resolver_manifest import TagManifest, describe, load_manifest, manifest_material, manifest_tag
+from .resolver_manifest import Frame, TagManifest, describe, load_manifest, manifest_material, manifest_tag
 from .resolver_names import (
     NOTHING,
     NameResult,
@@ -34,11 +36,20 @@ from .resolver_names import (
 )
 from .resolver_report import Coverage, ResolutionRow, coverage, is_unlabelled, resolution_table
 
-__all__ = ["Coverage", "ResolutionRow", "classify_name", "coverage", "resolution_table", "resolve_tags"]
+__all__ = [
+    "Coverage",
+    "ResolutionRow",
+    "classify_name",
+    "coverage",
+    "load_tagged_mesh",
+    "resolution_table",
+    "resolve_tags",
+]
 
 _log = logging.getLogger(__name__)
 
 Policy = Literal["error", "warn"]
+_GIVEN = "2 given by the program"
 
 
 def resolve_tags(
@@ -99,6 +110,43 @@ def resolve_tags(
     )
 
 
+def load_tagged_mesh(
+    path: str | os.PathLike[str],
+    *,
+    manifest: str | os.PathLike[str] | TagManifest | None = None,
+    mesh_frame: str | ArrayLike | None = None,
+    units: str | float | None = None,
+    carla_tags: str | os.PathLike[str] = "0.9.14",
+    unlabelled: Policy = "error",
+    max_unlabelled_area: float = 0.05,
+) -> TaggedMesh:
+    """Read a mesh file and resolve its tags: :func:`read_mesh` and :func:`resolve_tags` in one.
+
+    Parameters
+    ----------
+    path : path
+    manifest : path or TagManifest, optional
+    mesh_frame, units : optional
+        As for :func:`read_mesh`; where absent, those of the manifest's ``frame``, else ``"ros_z_up"`` and ``"m"``.
+    carla_tags, unlabelled, max_unlabelled_area
+        As for :func:`resolve_tags`.
+    """
+    sidecar = _manifest(manifest)
+    frame = sidecar.frame or Frame()
+    mesh = read_mesh(
+        path,
+        mesh_frame=frame.mesh_frame if mesh_frame is None else mesh_frame,
+        units=units if units is not None else frame.units if mesh_frame is None else "m",
+    )
+    return resolve_tags(
+        mesh,
+        manifest=manifest,
+        carla_tags=carla_tags,
+        unlabelled=unlabelled,
+        max_unlabelled_area=max_unlabelled_area,
+    )
+
+
 def _manifest(manifest: str | os.PathLike[str] | TagManifest | None) -> TagManifest:
     if manifest is None:
         return TagManifest(version=1)
@@ -140,7 +188,8 @@ def _by_manifest(part: Part, manifest: TagManifest, table: TagTable) -> NameResu
 
 def _by_declaration(part: Part, table: TagTable) -> NameResult:
     if part.declared_tag is None:
-        return NOTHING
+        given = part.tag is not SemanticTag.Unlabeled and part.rule in ("", _GIVEN)
+        return NameResult(part.tag, _GIVEN, part.tag.name) if given else NOTHING
     try:
         tag = _named_or_number(part.declared_tag, table)
     except InputError as error:
@@ -162,7 +211,7 @@ def _material(part: Part, manifest: TagManifest) -> str | None:
         return hit[1].material
     if part.declared_material is not None:
         return part.declared_material
-    if part.em_material is not None:
+    if part.em_material is not None and part.rule != "9 none":
         return part.em_material
     named = None if carries_no_material(part.material) else find_material(part.material)
     if named is None:
