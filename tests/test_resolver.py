@@ -375,3 +375,12 @@ def test_itu_name_without_an_entry_is_reported(caplog) -> None:
 def test_every_material_of_the_lexicon_is_in_the_default_table() -> None:
     table = yaml.safe_load((package_folder("materials") / "automotive.yaml").read_text())
     assert set(_MATERIAL_PHRASES) <= set(table["materials"])
+
+
+def test_every_tag_a_name_can_get_has_a_material() -> None:
+    from shenron_rt.config.materials import load_materials
+
+    table = load_materials("automotive")
+    assert classify_name("SM_Rock_3").tag is SemanticTag.Rock  # a name may say it under any numbering
+    for tag in SemanticTag:
+        assert table.for_tag(tag.name) in table.materials

@@ -29,6 +29,7 @@ _UNITS = {"cm": 0.01, "mm": 0.001, "inch": 0.0254}
 _VEHICLES = (Tag.Car, Tag.Truck, Tag.Bus)
 _LEVEL = (Tag.Roads, Tag.Sidewalks, Tag.RoadLines)
 _CAR_HEIGHT = (1.3, 2.6)
+_MOST_BOXES = 500
 _BINS = 16  # slices across a vehicle: 0.1 m, coarser than modelling noise, finer than a roof
 
 
@@ -64,6 +65,8 @@ def _largest_object(mesh: TaggedMesh, tag: Tag) -> FloatArray | None:
         return None
     boxes = mesh.part_bounds()[rows]
     boxes = boxes[np.isfinite(boxes).all(axis=(1, 2))]
+    # Every pair is compared: a town has thousands of trees, and a wrong unit shows in the biggest of them.
+    boxes = boxes[np.argsort(-np.ptp(boxes, axis=1).max(axis=1), kind="stable")[:_MOST_BOXES]]
     low, high = boxes[:, 0], boxes[:, 1]
     reach = 0.02 * np.linalg.norm(high - low, axis=1)
     gap = reach[:, None] + reach[None]
