@@ -50,7 +50,8 @@ def rotation_matrix(ypr_deg: ArrayLike) -> FloatArray:
     # Ry(-pitch) in the right-hand sense: pitch is nose up, and z is up.
     about_y = np.array([[cp, 0.0, -sp], [0.0, 1.0, 0.0], [sp, 0.0, cp]])
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    return about_z @ about_y @ about_x
+    rotation: FloatArray = about_z @ about_y @ about_x
+    return rotation
 
 
 @dataclass(frozen=True)
@@ -129,12 +130,14 @@ class Pose:
 
 def from_carla_points(points: ArrayLike) -> FloatArray:
     """Convert (n, 3) points or vectors from CARLA axes (y right) to ours (y left)."""
-    return np.asarray(points, dtype=np.float64) * _FLIP_Y
+    flipped: FloatArray = np.asarray(points, dtype=np.float64) * _FLIP_Y
+    return flipped
 
 
 def to_carla(points: ArrayLike) -> FloatArray:
     """Convert (n, 3) points or vectors from our axes (y left) to CARLA's (y right)."""
-    return np.asarray(points, dtype=np.float64) * _FLIP_Y
+    flipped: FloatArray = np.asarray(points, dtype=np.float64) * _FLIP_Y
+    return flipped
 
 
 def from_carla_pose(location: Sequence[float], rotation_deg: Sequence[float]) -> Pose:

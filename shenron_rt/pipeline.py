@@ -135,9 +135,7 @@ def simulate(
         backend=backend,
     )
     returns = illuminate(scatterers, used, model=model, materials=source.materials)
-    adc = synthesize(
-        returns, used, noise=noise, seed=scatterers.seed, frame=frame, accuracy=accuracy, radar=place.name
-    )
+    adc = synthesize(returns, used, noise=noise, seed=scatterers.seed, frame=frame, accuracy=accuracy, radar=place.name)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
     detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)

@@ -121,7 +121,7 @@ def illuminate(
     model: str = "physical",
     materials: MaterialTable | str | os.PathLike[str] | None = None,
 ) -> Returns:
-    """Light scatterers with a radar: the echo model and the radar equation.
+    """Light scatterers with a radar, by an echo model and the radar equation.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def illuminate(
 
     Returns
     -------
-    Returns
+    echoes : Returns
 
     Raises
     ------

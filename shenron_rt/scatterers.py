@@ -139,9 +139,9 @@ class Scatterers:
         distance: FloatArray = np.linalg.norm(self.position, axis=1)
         return distance
 
-    def select(self, rows: ArrayLike) -> Self:
-        """Return the rows picked by a mask or an index array."""
-        index = np.asarray(rows)
+    def select(self, rows: ArrayLike | slice) -> Self:
+        """Return the rows picked by a mask, an index array or a slice."""
+        index = rows if isinstance(rows, slice) else np.asarray(rows)
         picked = {
             f.name: getattr(self, f.name)[index] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
         }

@@ -24,6 +24,8 @@ class _SafeLoader(yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.Saf
 def _mapping_without_duplicates(loader: Any, node: yaml.MappingNode) -> dict[Any, Any]:
     seen: set[Any] = set()
     for key_node, _ in node.value:
+        if key_node.tag == "tag:yaml.org,2002:merge":
+            continue
         key = loader.construct_object(key_node, deep=True)
         if key in seen:
             raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
@@ -169,10 +171,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> di
         parts = dotted.split(".")
         target: Any = result
         for part in parts[:-1]:
-            if isinstance(target, list):
-                target = _item(target, part, dotted)
-            else:
-                target = target.setdefault(part, {})
+            target = _item(target, part, dotted) if isinstance(target, list) else target.setdefault(part, {})
             if not isinstance(target, dict | list):
                 raise ConfigError(f"--set {dotted}: {part!r} is a value, not a group of keys")
         parsed = yaml.load(value, Loader=_SafeLoader) if isinstance(value, str) else value

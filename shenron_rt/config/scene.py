@@ -165,10 +165,11 @@ class Scene(ConfigModel):
     def _ids_and_names_are_unique(self) -> Self:
         moving = [item.id for group in (self.actors, self.point_targets) for item in group]
         ids = [*moving, *{s.id for s in self.static if s.id}]
-        for label, values in (("id", ids), ("radar name", [r.name for r in self.radars])):
-            twice = sorted({v for v in values if values.count(v) > 1}, key=str)
+        names = [r.name for r in self.radars]
+        for label, values in (("id", [str(i) for i in ids]), ("radar name", names)):
+            twice = sorted({v for v in values if values.count(v) > 1})
             if twice:
-                raise ValueError(f"{label} {twice[0]!r} is given to more than one thing")
+                raise ValueError(f"{label} {twice[0]} is given to more than one thing")
         return self
 
     def radar(self, name: str | None = None) -> RadarMount:

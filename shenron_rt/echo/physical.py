@@ -7,14 +7,17 @@ incoherent part, sigma0 times area with exponentially distributed power. Point t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED, SPEED_OF_LIGHT
 from ..errors import InputError
-from ..physics.footprint import tube_integral
+from ..physics.footprint import interior, tube_integral
 from ..physics.fresnel import backscatter_reflection
 from ..randomness import frame_generator
 from ..returns import Returns
@@ -65,139 +68,207 @@ def physical_returns(scatterers: Scatterers, profile: RadarProfile, materials: M
             "the physical model needs Scatterers.area [m^2] for every row; a bare table has none: pass area= to "
             "Scatterers.from_table"
         )
-    link = link_amplitude(profile, scatterers.position, scatterers.weather)
+    index = _material_index(scatterers, materials)
+    tables = _tables(scatterers, index, profile, materials)
+    gauss = _speckle(scatterers)
+
+    def block(rows: slice) -> list[_Echo]:
+        part = replace(scatterers.select(rows), speckle=gauss[rows])
+        return _echoes(part, index[rows], tables, profile, rows.start)
+
+    blocks = map_blocks(block, len(scatterers)) or [[]]
+    return _assemble(
+        scatterers, [e for kind in (True, False) for b in blocks for e in b if e.coherent == kind], profile
+    )
+
+
+def _echoes(
+    scatterers: Scatterers, index: IntArray, tables: Mapping[int, _Table], profile: RadarProfile, first: int
+) -> list[_Echo]:
+    """Return the echoes of a block of rows whose first is row ``first`` of the whole."""
     given = np.zeros(len(scatterers), dtype=bool) if scatterers.rcs is None else ~np.isnan(scatterers.rcs)
+    light = _Light.of(scatterers, profile)
     surface = np.flatnonzero(~given)
-    curves = _Curves(scatterers, surface, profile, materials)
-    speckle = _incoherent(scatterers, surface, link[surface], curves.sigma0, profile)
-    echoes = [_points(scatterers, np.flatnonzero(given), link[given], profile)]
+    curves = _Curves.of(scatterers, light.direction, index, tables, surface)
+    echoes = [_points(scatterers, np.flatnonzero(given), light, profile)]
     if scatterers.footprint is not None and scatterers.normal is not None:
-        echoes.append(_coherent(scatterers, surface, link[surface], curves, profile))
-    echoes.append(speckle)
-    return _assemble(scatterers, echoes, profile)
+        echoes.append(_coherent(scatterers, surface, light, curves, profile))
+    echoes.append(_incoherent(scatterers, surface, light, curves, profile))
+    return [e._replace(scatterer=e.scatterer + first) for e in echoes]
 
 
-class _Curves:
-    """Reflection, roughness and sigma0 of each row, interpolated from one table a material."""
+class _Light(NamedTuple):
+    """What reaches each row of a block: link amplitude [sqrt(W)], distance [m] and direction from the radar."""
 
-    def __init__(
-        self, scatterers: Scatterers, rows: IntArray, profile: RadarProfile, materials: MaterialTable
-    ) -> None:
-        self.cos = scatterers.cos_incidence[rows]
-        self.te = np.zeros(len(rows), dtype=np.complex128)
-        self.tm = np.zeros(len(rows), dtype=np.complex128)
-        self.roughness_m = np.zeros(len(rows))
-        self.sigma0 = np.zeros(len(rows))
-        grid = np.linspace(0.0, 1.0, _TABLE)
-        rain = 0.0 if scatterers.weather is None else scatterers.weather.rain_mm_h
-        index = _material_index(scatterers, rows, materials)
-        for number in np.unique(index):
-            name = materials.in_weather(_names(scatterers, materials)[number], rain)
-            material = materials.materials[name]
-            here = np.flatnonzero(index == number)
-            cell, weight = _interpolation(self.cos[here])
-            te, tm = material.reflection(profile.center_hz, np.maximum(grid, 1e-6))
-            sigma0 = material.sigma0(profile.center_hz, np.maximum(grid, 1e-6), profile.antenna.polarization)
-            for target, curve in ((self.te, te), (self.tm, tm), (self.sigma0, sigma0)):
-                curve = np.asarray(curve)
-                target[here] = curve[cell] * (1.0 - weight) + curve[cell + 1] * weight
-            self.roughness_m[here] = material.roughness_rms_m
+    link: FloatArray
+    distance: FloatArray
+    direction: FloatArray
+
+    @classmethod
+    def of(cls, scatterers: Scatterers, profile: RadarProfile) -> _Light:
+        distance = scatterers.range
+        direction = scatterers.position / np.maximum(distance, 1e-12)[:, None]
+        return cls(link_amplitude(profile, scatterers.position, scatterers.weather), distance, direction)
 
 
-def _interpolation(cos: FloatArray) -> tuple[IntArray, FloatArray]:
-    place = np.clip(cos, 0.0, 1.0) * (_TABLE - 1)
-    cell = np.minimum(place.astype(np.int64), _TABLE - 2)
-    return cell, place - cell
+class _Table(NamedTuple):
+    """Curves of one material over ``_TABLE`` cosines from 0 to 1; sigma0 in the plane of incidence and across it."""
+
+    te: ComplexArray
+    tm: ComplexArray
+    in_plane: FloatArray
+    across: FloatArray
+    roughness_m: float
+
+
+def _tables(
+    scatterers: Scatterers, index: IntArray, profile: RadarProfile, materials: MaterialTable
+) -> dict[int, _Table]:
+    rain = 0.0 if scatterers.weather is None else scatterers.weather.rain_mm_h
+    names = _names(scatterers, materials)
+    cos = np.maximum(np.linspace(0.0, 1.0, _TABLE), 1e-6)
+    tables = {}
+    for number in np.flatnonzero(np.bincount(index)):
+        material = materials[materials.in_weather(names[number], rain)]
+        te, tm = material.reflection(profile.center_hz, cos)
+        # V of the antenna is the field in the plane of incidence on a road, but across it on a wall beside the road
+        across = profile.antenna.polarization.translate(str.maketrans("VH", "HV"))
+        in_plane, other = (
+            np.asarray(material.sigma0(profile.center_hz, cos, p)) for p in (profile.antenna.polarization, across)
+        )
+        tables[int(number)] = _Table(np.asarray(te), np.asarray(tm), in_plane, other, material.roughness_rms_m)
+    return tables
+
+
+class _Curves(NamedTuple):
+    """Reflection, sigma0 and roughness of some rows."""
+
+    te: ComplexArray
+    tm: ComplexArray
+    sigma0: FloatArray
+    roughness_m: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        scatterers: Scatterers,
+        direction: FloatArray,
+        index: IntArray,
+        tables: Mapping[int, _Table],
+        rows: IntArray,
+    ) -> _Curves:
+        n, cos = len(rows), scatterers.cos_incidence
+        turned = np.zeros(n) if scatterers.normal is None else _across_share(scatterers.normal[rows], direction[rows])
+        te, tm = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.complex128)
+        sigma0, roughness = np.zeros(n), np.zeros(n)
+        place = np.clip(cos[rows], 0.0, 1.0) * (_TABLE - 1)
+        cell = np.minimum(place.astype(np.int64), _TABLE - 2)
+        weight = place - cell
+        material = index[rows]
+        for number in np.flatnonzero(np.bincount(material)) if n else ():
+            here = np.flatnonzero(material == number)
+            c, w = cell[here], weight[here]
+            table = tables[int(number)]
+            for target, curve in ((te, table.te), (tm, table.tm), (sigma0, table.in_plane)):
+                target[here] = curve[c] * (1.0 - w) + curve[c + 1] * w
+            if not np.array_equal(table.in_plane, table.across):
+                other = table.across[c] * (1.0 - w) + table.across[c + 1] * w
+                sigma0[here] += turned[here] * (other - sigma0[here])
+            roughness[here] = table.roughness_m
+        return cls(te, tm, sigma0, roughness)
+
+
+def _across_share(normal: FloatArray, u: FloatArray) -> FloatArray:
+    """Return sin^2 of the angle between the antenna's V and the plane of incidence: n_H^2 / (n_H^2 + n_V^2)."""
+    horizontal = np.hypot(u[:, 0], u[:, 1])
+    n_h = normal[:, 1] * u[:, 0] - normal[:, 0] * u[:, 1]
+    n_v = horizontal**2 * normal[:, 2] - u[:, 2] * (normal[:, 0] * u[:, 0] + normal[:, 1] * u[:, 1])
+    total = n_h**2 + n_v**2
+    return np.divide(n_h**2, total, out=np.zeros_like(total), where=total > 0)
 
 
 def _names(scatterers: Scatterers, materials: MaterialTable) -> tuple[str, ...]:
     return scatterers.material_names if scatterers.material is not None else tuple(materials.materials)
 
 
-def _material_index(scatterers: Scatterers, rows: IntArray, materials: MaterialTable) -> IntArray:
-    """Return (len(rows),) index into the material names; without materials on the rows the tag decides."""
+def _material_index(scatterers: Scatterers, materials: MaterialTable) -> IntArray:
+    """Return (n,) int64 index into the material names; without materials on the rows the tag decides."""
     from ..tags import SemanticTag
 
     if scatterers.material is not None:
-        return scatterers.material[rows].astype(np.int64)
+        return scatterers.material.astype(np.int64)
     names = list(materials.materials)
     by_tag = np.full(256, -1, dtype=np.int64)
-    for value in np.unique(scatterers.tag[rows]):
+    for value in np.flatnonzero(np.bincount(scatterers.tag)) if len(scatterers) else ():
         by_tag[value] = names.index(materials.for_tag(SemanticTag(int(value)).name))
-    return by_tag[scatterers.tag[rows]]
+    return by_tag[scatterers.tag]
 
 
-def _coherent(
-    scatterers: Scatterers, rows: IntArray, link: FloatArray, curves: _Curves, profile: RadarProfile
-) -> _Echo:
+def _speckle(scatterers: Scatterers) -> ComplexArray:
+    """Return (n,) unit-power circular Gaussian numbers: the tracer's, or fresh ones from the same seed."""
+    if scatterers.speckle is not None:
+        return scatterers.speckle
+    generator = frame_generator(scatterers.seed, scatterers.frame, scatterers.radar, "speckle")
+    return (generator.standard_normal((len(scatterers), 2)) * math.sqrt(0.5)).view(np.complex128)[:, 0]
+
+
+def _coherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Curves, profile: RadarProfile) -> _Echo:
     assert scatterers.footprint is not None
     assert scatterers.normal is not None
     assert scatterers.area is not None
     wavenumber = 2.0 * math.pi * profile.center_hz / SPEED_OF_LIGHT
-    position = scatterers.position[rows]
-    distance = np.linalg.norm(position, axis=1)
-    rough = np.exp(-2.0 * (wavenumber * curves.roughness_m * curves.cos) ** 2)
+    cos, link, distance = scatterers.cos_incidence[rows], light.link[rows], light.distance[rows]
+    rough = np.exp(-2.0 * (wavenumber * curves.roughness_m * cos) ** 2)
     # sqrt(Pt Gt Gr / L) lambda / (4 pi)^1.5 x 2 sqrt(pi) / lambda = sqrt(Pt Gt Gr / L) / (4 pi): with the solid angle
     # in place of cos dA / r^2 neither lambda nor R is left.
     scale = link * rough / (4.0 * math.pi)
     # |integral| cannot exceed the solid angle: rows that are negligible even then need no integral
-    solid = scatterers.area[rows] * curves.cos / distance**2
+    solid = scatterers.area[rows] * cos / distance**2
     speckle = curves.sigma0 * scatterers.area[rows] * (profile.wavelength_m * link / distance**2) ** 2 / FOUR_PI_CUBED
     reflect = np.maximum(np.abs(curves.te), np.abs(curves.tm))
-    keep = np.flatnonzero((scale * reflect * solid) ** 2 > _NEGLIGIBLE * speckle)
-    u = position[keep] / distance[keep, None]
-    normal = scatterers.normal[rows[keep]]
-    gamma = backscatter_reflection(curves.te[keep], curves.tm[keep], normal, u, profile.antenna.polarization)
-    joined = None if scatterers.joined is None else scatterers.joined[rows[keep]]
-    integral = tube_integral(u, scatterers.footprint[rows[keep]], normal, distance[keep], wavenumber, joined)
+    keep = (scale * reflect * solid) ** 2 > _NEGLIGIBLE * speckle
+    joined = np.zeros((len(rows), 4), dtype=bool) if scatterers.joined is None else scatterers.joined[rows]
+    geometry = (light.direction[rows], scatterers.footprint[rows], scatterers.normal[rows], distance)
+    keep &= ~interior(*geometry, wavenumber, joined)
+    kept = np.flatnonzero(keep)
+    u, edges, normal, reach = (g[kept] for g in geometry)
+    gamma = backscatter_reflection(curves.te[kept], curves.tm[kept], normal, u, profile.antenna.polarization)
+    integral = tube_integral(u, edges, normal, reach, wavenumber, joined[kept])
     # The one conjugation from e^{+jwt} echo phasors to the de-chirped signal conj(rx) tx.
-    amplitude = np.conj(scale[keep] * gamma * integral)
-    strong = np.abs(amplitude) ** 2 > _NEGLIGIBLE * speckle[keep]
-    return _Echo(amplitude[strong], position[keep][strong], rows[keep][strong], True)
+    amplitude = np.conj(scale[kept] * gamma * integral)
+    strong = np.flatnonzero(np.abs(amplitude) ** 2 > _NEGLIGIBLE * speckle[kept])
+    source = rows[kept[strong]]
+    return _Echo(amplitude[strong], scatterers.position[source], source, True)
 
 
-def _incoherent(
-    scatterers: Scatterers, rows: IntArray, link: FloatArray, sigma0: FloatArray, profile: RadarProfile
-) -> _Echo:
+def _incoherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Curves, profile: RadarProfile) -> _Echo:
     assert scatterers.area is not None
-    lit = np.flatnonzero(sigma0 > 0)
-    picked = rows[lit]
-    if scatterers.speckle is not None:
-        gauss = scatterers.speckle[picked]
-    else:
-        generator = frame_generator(scatterers.seed, scatterers.frame, scatterers.radar, "speckle")
-        every = generator.standard_normal((len(scatterers), 2)) * math.sqrt(0.5)
-        gauss = every.view(np.complex128)[picked, 0]
-    position = scatterers.position[picked]
-    distance2 = np.einsum("ij,ij->i", position, position)
-    sigma = sigma0[lit] * scatterers.area[picked]
-    amplitude = link[lit] * profile.wavelength_m / math.sqrt(FOUR_PI_CUBED) * np.sqrt(sigma) / distance2 * gauss
-    return _Echo(amplitude, _jittered(scatterers, picked), picked, False)
+    assert scatterers.speckle is not None
+    lit = np.flatnonzero(curves.sigma0 > 0)
+    source = rows[lit]
+    root = np.sqrt(curves.sigma0[lit] * scatterers.area[source])
+    scale = light.link[source] * (profile.wavelength_m / math.sqrt(FOUR_PI_CUBED)) * root / light.distance[source] ** 2
+    return _Echo(scale * scatterers.speckle[source], _jittered(scatterers, source, light), source, False)
 
 
-def _jittered(scatterers: Scatterers, rows: IntArray) -> FloatArray:
+def _jittered(scatterers: Scatterers, rows: IntArray, light: _Light) -> FloatArray:
     """Return where in its footprint each incoherent echo sits: a point of its own, or coarse cells would be a comb."""
     position = scatterers.position[rows]
     if scatterers.footprint is None or scatterers.normal is None or scatterers.jitter is None:
         return position
-    distance = np.linalg.norm(position, axis=1)
-    offset = np.einsum("ij,ijk->ik", scatterers.jitter[rows], scatterers.footprint[rows])
-    w = position / distance[:, None] + offset
-    normal = scatterers.normal[rows]
-    height = np.einsum("ij,ij->i", normal, position)
-    along = np.einsum("ij,ij->i", normal, w)
+    distance, normal = light.distance[rows], scatterers.normal[rows]
+    edges, place = scatterers.footprint[rows], scatterers.jitter[rows]
+    w = light.direction[rows] + edges[:, 0] * place[:, :1] + edges[:, 1] * place[:, 1:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = height / along
+        reach = np.einsum("ij,ij->i", normal, position) / np.einsum("ij,ij->i", normal, w)
     inside = np.abs(reach - distance) < _MAX_SHIFT * distance
     return np.where(inside[:, None], w * np.where(inside, reach, 0.0)[:, None], position)
 
 
-def _points(scatterers: Scatterers, rows: IntArray, link: FloatArray, profile: RadarProfile) -> _Echo:
-    position = scatterers.position[rows]
-    distance2 = np.einsum("ij,ij->i", position, position)
+def _points(scatterers: Scatterers, rows: IntArray, light: _Light, profile: RadarProfile) -> _Echo:
     sigma = np.zeros(0) if scatterers.rcs is None else scatterers.rcs[rows]
-    amplitude = link * profile.wavelength_m * np.sqrt(sigma / FOUR_PI_CUBED) / distance2
-    return _Echo(amplitude.astype(np.complex128), position, rows, True)
+    amplitude = light.link[rows] * profile.wavelength_m * np.sqrt(sigma / FOUR_PI_CUBED) / light.distance[rows] ** 2
+    return _Echo(amplitude.astype(np.complex128), scatterers.position[rows], rows, True)
 
 
 def _assemble(scatterers: Scatterers, echoes: list[_Echo], profile: RadarProfile) -> Returns:

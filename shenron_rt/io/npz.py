@@ -44,7 +44,7 @@ def atomic_write(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None
 
 def save_npz(path: str | os.PathLike[str], arrays: dict[str, Any]) -> Path:
     """Save named arrays; ``None`` is left out, strings become zero-dimensional arrays."""
-    kept = {k: np.asarray(v) for k, v in arrays.items() if v is not None}
+    kept: dict[str, Any] = {k: np.asarray(v) for k, v in arrays.items() if v is not None}
     return atomic_write(path, lambda file: np.savez(file, **kept))
 
 

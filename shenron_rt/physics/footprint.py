@@ -6,7 +6,7 @@ unit normal m pointing away from the radar.
 
 In polar angles (theta, psi) about m, with c = cos(theta) and K = 2kh, Green's theorem turns it into a contour integral,
 I = closed integral of F dpsi, F = integral from c to 1 of exp(-jK/c') dc' = [exp(-jK) - c^2 exp(-jK/c)] / (jK) to
-leading order in 1/K, which is below 1e-3 at 0.1 m and 24 GHz. The first term counts only in the one cell that holds m.
+leading order in 1/K, which is below 1e-2 at 0.1 m and 24 GHz. The first term counts only in the one cell that holds m.
 Every straight edge is evaluated from its two end points with the phase exact there and linear between, so that the
 edges two cells share on one plane cancel to rounding: a smooth road at grazing incidence returns nothing but its rim,
 although each footprint there is metres long. Where the phase is nearly stationary the amplitude of dpsi changes too
@@ -19,13 +19,11 @@ import numpy as np
 
 from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 
-__all__ = ["tube_integral"]
+__all__ = ["interior", "tube_integral"]
 
-#: Phase across half a cell below which it counts as nearly stationary [rad].
-_STATIONARY = 16.0
-#: Phase across half a cell above which neither cell of an edge can be stationary: from one cell to the next it changes
-#: by the quadratic part only, which stays below 10 rad where the phase is nearly stationary.
-_SETTLED = 48.0
+#: Phase along half an edge, if the edge followed the gradient, from which the contour is accurate (1e-3 of the cell's
+#: solid angle at this value, falling with its square) [rad].
+_SETTLED = 16.0
 
 
 def tube_integral(
@@ -73,22 +71,19 @@ def tube_integral(
        1995.
     """
     result = np.zeros(len(distance), dtype=np.complex128)
-    rows = np.arange(len(distance))
-    if joined is not None:
-        rows = np.flatnonzero(~_surely_zero(direction, edges, normal, distance, wavenumber, joined))
-        direction, edges, normal = direction[rows], edges[rows], normal[rows]
-        distance, joined = distance[rows], joined[rows]
     corners = _Corners(direction, edges, normal, distance, wavenumber)
-    phase = corners.phase
-    across_u = (phase[1] + phase[2] - phase[0] - phase[3]) / 4
-    across_v = (phase[2] + phase[3] - phase[0] - phase[1]) / 4
     # A corner beyond the horizon of the plane has no phase: the contour does not exist, and nothing comes back.
     whole = np.all(corners.cosine > 0, axis=0)
-    stationary = across_u**2 + across_v**2 < _STATIONARY**2
+    # An edge is seen alike from both of its cells, so they agree on which of them leave it out, and neither of those
+    # is stationary.
+    settled = corners.slope >= _SETTLED
+    left_out = np.zeros_like(settled) if joined is None else settled & joined.T
+    holds = np.all(corners.turn > 0, axis=0)  # the normal itself: the phase is stationary inside
+    stationary = ~settled.any(axis=0) | (holds & ~left_out.any(axis=0))
     far = np.flatnonzero(whole & ~stationary)
-    result[rows[far]] = _contour(corners, far, distance[far], wavenumber, None if joined is None else joined[far])
+    result[far] = _contour(corners, far, wavenumber, left_out[:, far], holds[far])
     near = np.flatnonzero(whole & stationary)
-    result[rows[near]] = _separable(direction[near], edges[near], normal[near], distance[near], wavenumber)
+    result[near] = _separable(direction[near], edges[near], normal[near], distance[near], wavenumber)
     return result
 
 
@@ -104,7 +99,7 @@ def _triple(a: FloatArray, b: FloatArray, n: FloatArray) -> FloatArray:
     return x * n[:, 0] + y * n[:, 1] + z * n[:, 2]
 
 
-def _surely_zero(
+def interior(
     direction: FloatArray,
     edges: FloatArray,
     normal: FloatArray,
@@ -112,7 +107,14 @@ def _surely_zero(
     wavenumber: float,
     joined: BoolArray,
 ) -> BoolArray:
-    """Return which cells have neighbours all around and every edge far beyond ``_SETTLED``."""
+    """Return which cells give exactly zero because all their edges are joined and far from stationary.
+
+    Parameters are those of :func:`tube_integral`; a cheap test that may miss some of them.
+
+    Returns
+    -------
+    (n,) bool
+    """
     cos = np.abs(_dot(direction, normal))
     half = np.sqrt(np.minimum(_dot(edges[:, 0], edges[:, 0]), _dot(edges[:, 1], edges[:, 1])))
     slope = 2.0 * wavenumber * distance * np.sqrt(np.maximum(1.0 - cos**2, 0.0)) * half
@@ -125,7 +127,8 @@ class _Corners:
     """The four corner directions w of each cell, in the order (-,-), (+,-), (+,+), (-,+) of (u, v).
 
     ``cosine`` is m . w and ``square`` is w . w, both (4, n), for w not of unit length; ``phase`` is 2k(r - r_c) [rad];
-    ``turn`` is m . (w_i x w_i+1) of the edges, ``length2`` (2, n) the squared length of those along u and v.
+    ``turn`` is m . (w_i x w_i+1) of the edges and ``slope`` the phase along half of each, k r tan(theta) times its
+    angle, did it follow the gradient [rad]; it does not depend on the lengths of the w.
     """
 
     def __init__(
@@ -140,42 +143,39 @@ class _Corners:
         uv = 2.0 * _dot(e_u, e_v)
         uu, vv = _dot(e_u, e_u), _dot(e_v, e_v)
         sides = 1.0 + uu + vv
-        self.length2 = 4.0 * np.stack([uu, vv])
         self.cosine = np.stack([center - nu - nv, center + nu - nv, center + nu + nv, center - nu + nv])
         self.square = np.stack([sides - du - dv + uv, sides + du - dv - uv, sides + du + dv + uv, sides - du + dv - uv])
         cross_u, cross_v = _triple(direction, e_u, away), _triple(direction, e_v, away)
         cross_uv = _triple(e_u, e_v, away)
         self.turn = 2.0 * np.stack([cross_u + cross_uv, cross_v + cross_uv, cross_uv - cross_u, cross_uv - cross_v])
+        self.distance = distance
         self.height = distance * center
         with np.errstate(divide="ignore", invalid="ignore"):
             self.phase = 2.0 * wavenumber * (self.height * np.sqrt(self.square) / self.cosine - distance)
+            self.tangential = np.sqrt(np.maximum(self.square - self.cosine**2, 1e-300))
+            ratio = np.sqrt(self.tangential) / self.cosine
+            length = 2.0 * np.sqrt(np.stack([uu, vv, uu, vv]))
+            self.slope = wavenumber * self.height * length * ratio * np.roll(ratio, -1, axis=0)
 
 
 def _contour(
-    corners: _Corners, rows: IntArray, distance: FloatArray, wavenumber: float, joined: BoolArray | None
+    corners: _Corners, rows: IntArray, wavenumber: float, left_out: BoolArray, holds: BoolArray
 ) -> ComplexArray:
-    square, cosine, phase = corners.square[:, rows], corners.cosine[:, rows], corners.phase[:, rows]
-    turn, height = corners.turn[:, rows], corners.height[rows]
-    c = cosine / np.sqrt(square)
-    tangential = np.sqrt(np.maximum(square - cosine**2, 1e-300))
+    phase, turn, height = corners.phase[:, rows], corners.turn[:, rows], corners.height[rows]
+    tangential = corners.tangential[:, rows]
+    c = corners.cosine[:, rows] / np.sqrt(corners.square[:, rows])
     phasor = np.exp(-1j * phase)
-    length2 = corners.length2[:, rows]
-    settled = (_SETTLED / (wavenumber * height)) ** 2
-    total = np.zeros(len(distance), dtype=np.complex128)
+    total = np.zeros(len(rows), dtype=np.complex128)
     for i in range(4):
         j = (i + 1) % 4
         step = phase[j] - phase[i]
         flat = np.abs(step) < 1e-4
         mean = (phasor[i] - phasor[j]) / (1j * np.where(flat, 1.0, step))
         mean = np.where(flat, 0.5 * (phasor[i] + phasor[j]), mean)
-        weight = c[i] * c[j] * turn[i] / (tangential[i] * tangential[j])
-        if joined is not None:
-            # Phase across half a cell at the edge, k r tan(theta) times the edge's angle, from what both of its
-            # cells see alike whatever the length of their direction vectors.
-            square_slope = length2[i % 2] * tangential[i] * tangential[j] / (cosine[i] * cosine[j]) ** 2
-            weight = np.where(joined[:, i] & (square_slope > settled), 0.0, weight)
-        total += weight * mean
-    return 1j / (2.0 * wavenumber * height) * total
+        sine = np.clip(turn[i] / (tangential[i] * tangential[j]), -1.0, 1.0)
+        total += np.where(left_out[i], 0.0, c[i] * c[j] * np.arcsin(sine)) * mean
+    pole = 2.0 * np.pi * np.exp(2j * wavenumber * (corners.distance[rows] - height))
+    return 1j / (2.0 * wavenumber * height) * (total - np.where(holds, pole, 0.0))
 
 
 def _separable(
@@ -198,7 +198,7 @@ def _quadratic_phase(linear: FloatArray, quadratic: FloatArray) -> ComplexArray:
     """Return the integral of exp(-j(a u + c u^2)) over u in [-1, 1]."""
     from scipy.special import fresnel
 
-    result: ComplexArray = 2.0 * np.sinc(linear / np.pi) + 0j
+    result: ComplexArray = (2.0 * np.sinc(linear / np.pi)).astype(np.complex128)
     bent: BoolArray = np.abs(quadratic) > 1e-3
     if np.any(bent):
         a, c = linear[bent], quadratic[bent]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
-from .._typing import FloatArray, IntArray
+from .._typing import FloatArray, IntArray, NDArray
 from ..config.loader import resolve_path
 from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Actor, MeshSource, RadarMount, Scene
@@ -113,7 +114,7 @@ def source_mesh(source: MeshSource, folder: Path) -> TaggedMesh:
     file = resolve_path(str(source.mesh), folder, f"mesh of {source.name or 'a part'}")
     manifest = None if source.resolve is None else resolve_path(str(source.resolve), folder, "resolve")
     stamp = (file.stat().st_mtime_ns, 0 if manifest is None else manifest.stat().st_mtime_ns)
-    policy = "warn" if source.tag else source.unlabelled
+    policy: Literal["error", "warn"] = "warn" if source.tag else source.unlabelled
     return _file(file, source.mesh_frame, source.units, manifest, source.carla_tags, policy, stamp)
 
 
@@ -131,7 +132,7 @@ def _file(
     units: str | float,
     manifest: Path | None,
     carla_tags: str,
-    unlabelled: str,
+    unlabelled: Literal["error", "warn"],
     stamp: tuple[int, int],
 ) -> TaggedMesh:
     from .readers import read_mesh
@@ -173,8 +174,8 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
     if not keep.all():
         mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
     object_id = int(getattr(entry, "id", 0))
-    material = index[mesh.part]
-    return Body(object_id, entry, mesh, face_tag[keep], material, _planes(mesh, material))
+    face_material = index[mesh.part]
+    return Body(object_id, entry, mesh, face_tag[keep], face_material, _planes(mesh, face_material))
 
 
 def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
@@ -184,7 +185,9 @@ def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
     largest = np.take_along_axis(normal, np.abs(normal).argmax(axis=1)[:, None], axis=1)
     normal = normal * np.where(largest < 0, -1.0, 1.0)
     offset = np.einsum("ij,ij->i", normal, mesh.vertices[mesh.faces[:, 0]])
-    key = np.column_stack([np.round(normal * 1e7), np.round(offset * 1e6), material.astype(np.float64)]).astype(np.int64)
+    key = np.column_stack([np.round(normal * 1e7), np.round(offset * 1e6), material.astype(np.float64)]).astype(
+        np.int64
+    )
     rows = np.ascontiguousarray(key).view(np.dtype((np.void, key.dtype.itemsize * key.shape[1])))
     _, plane = np.unique(rows.ravel(), return_inverse=True)
     return plane.astype(np.int32)
@@ -248,7 +251,7 @@ def build_world(
     )
 
 
-def _stack(items: list[np.ndarray], empty: tuple[int, ...], dtype: type) -> np.ndarray:  # type: ignore[type-arg]
+def _stack(items: list[NDArray[Any]], empty: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:
     return np.concatenate(items).astype(dtype, copy=False) if items else np.zeros(empty, dtype)
 
 

@@ -16,6 +16,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any, Literal, get_args
 
 from ..errors import BackendError, InputError, did_you_mean
@@ -28,7 +29,9 @@ BackendChoice = Literal["auto", "cuda", "llvm", "scalar"]
 _VARIANT: dict[Backend, str] = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 #: Oldest LLVM that is not known to abort; 17 and 18 are probed in a process of their own first.
 _OLDEST_LLVM, _TESTED_LLVM = 17, 19
-FIX_LLVM = "install LLVM 19 (apt-get install libllvm19) or point DRJIT_LIBLLVM_PATH at a libLLVM.so of version 19 or newer"
+FIX_LLVM = (
+    "install LLVM 19 (apt-get install libllvm19) or point DRJIT_LIBLLVM_PATH at a libLLVM.so of version 19 or newer"
+)
 
 _log = logging.getLogger(__name__)
 
@@ -63,13 +66,13 @@ def backend_status(backend: Backend) -> Status:
 def _check_llvm() -> Status:
     import drjit
 
-    version: tuple[int, ...] = tuple(drjit.detail.llvm_version())
-    shown = ".".join(str(v) for v in version)
-    if version[0] < _OLDEST_LLVM:
-        return Status("llvm", False, f"LLVM {shown} aborts in Dr.Jit {drjit.__version__}; to fix it: {FIX_LLVM}")
-    if version[0] < _TESTED_LLVM and not _probe_in_subprocess():
+    found: tuple[int, ...] = tuple(drjit.detail.llvm_version())
+    shown = ".".join(str(v) for v in found)
+    if found[0] < _OLDEST_LLVM:
+        return Status("llvm", False, f"LLVM {shown} aborts in Dr.Jit {version('drjit')}; to fix it: {FIX_LLVM}")
+    if found[0] < _TESTED_LLVM and not _probe_in_subprocess():
         return Status("llvm", False, f"LLVM {shown} failed a trial kernel; to fix it: {FIX_LLVM}")
-    return Status("llvm", True, f"LLVM {shown}, Dr.Jit {drjit.__version__}")
+    return Status("llvm", True, f"LLVM {shown}, Dr.Jit {version('drjit')}")
 
 
 def _check_cuda() -> Status:
@@ -77,13 +80,12 @@ def _check_cuda() -> Status:
 
     if not drjit.has_backend(drjit.JitBackend.CUDA):
         return Status("cuda", False, "no CUDA device or driver")
-    return Status("cuda", True, f"CUDA device, Dr.Jit {drjit.__version__}")
+    return Status("cuda", True, f"CUDA device, Dr.Jit {version('drjit')}")
 
 
 def _check_scalar() -> Status:
-    import mitsuba as mi
 
-    return Status("scalar", True, f"Mitsuba {mi.__version__}, one ray at a time (slow)")
+    return Status("scalar", True, f"Mitsuba {version('mitsuba')}, one ray at a time (slow)")
 
 
 _CHECKS = {"llvm": _check_llvm, "cuda": _check_cuda, "scalar": _check_scalar}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._typing import FloatArray, IntArray
+from .._typing import FloatArray, IntArray, NDArray
 from .backend import Backend, use_backend
 
 __all__ = ["RayCaster"]
@@ -40,31 +40,31 @@ class RayCaster:
                 parameters.update()
                 self._scene = mi.load_dict({"type": "scene", "world": self._mesh})
 
-    def cast(self, directions: FloatArray) -> IntArray:
-        """Return (n,) int64 row of the nearest face along each direction from the origin, -1 where nothing is hit.
+    def cast(self, directions: NDArray[np.float32]) -> IntArray:
+        """Return (n,) int32 row of the nearest face along each direction from the origin, -1 where nothing is hit.
 
         Parameters
         ----------
-        directions : (n, 3) float
-            Unit vectors.
+        directions : (3, n) float32
+            Unit vectors, component by component.
         """
-        if self._scene is None or len(directions) == 0:
-            return np.full(len(directions), -1, dtype=np.int64)
+        n = directions.shape[1]
+        if self._scene is None or n == 0:
+            return np.full(n, -1, dtype=np.int32)
         with use_backend(self.backend) as mi:
             run = self._one_by_one if self.backend == "scalar" else self._at_once
-            blocks = [run(mi, directions[i : i + _BLOCK]) for i in range(0, len(directions), _BLOCK)]
+            blocks = [run(mi, directions[:, i : i + _BLOCK]) for i in range(0, n, _BLOCK)]
         return np.concatenate(blocks)
 
-    def _at_once(self, mi: Any, directions: FloatArray) -> IntArray:
+    def _at_once(self, mi: Any, d: NDArray[np.float32]) -> IntArray:
         import drjit as dr
 
-        d = np.ascontiguousarray(directions.T, dtype=np.float32)
-        ray = mi.Ray3f(mi.Point3f(0, 0, 0), mi.Vector3f(d[0], d[1], d[2]))
+        ray = mi.Ray3f(mi.Point3f(0, 0, 0), mi.Vector3f(*(np.ascontiguousarray(c) for c in d)))
         hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
         prim = dr.select(hit.is_valid(), mi.Int(hit.prim_index), mi.Int(-1))
-        return prim.numpy().astype(np.int64)
+        return np.asarray(prim.numpy(), dtype=np.int32)
 
-    def _one_by_one(self, mi: Any, directions: FloatArray) -> IntArray:
+    def _one_by_one(self, mi: Any, d: NDArray[np.float32]) -> IntArray:
         cast, Ray, origin = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f(0, 0, 0)
-        hits = (cast(Ray(origin, d), True) for d in directions.astype(np.float32).tolist())
-        return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int64, len(directions))
+        hits = (cast(Ray(origin, direction), True) for direction in d.T.tolist())
+        return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int32, d.shape[1])

@@ -8,11 +8,13 @@ one random angle a frame; a jitter of its own for every ray would destroy the ph
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
-from .._typing import FloatArray, IntArray
+from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import PATTERN_FLOOR_TWO_WAY_DB
 from ..frames import rotation_matrix, spherical
 from ..physics.antenna import AntennaPattern
@@ -27,9 +29,9 @@ class Cells:
     Parameters
     ----------
     direction : (n, 3) float
-        Unit vectors.
+        Unit vectors, before ``turn``.
     edges : (n, 2, 3) float
-        Half edges before ``turn``: the corners are the directions d +- e_u +- e_v (not of unit length), e_u x e_v
+        Half edges, before ``turn``: the corners are the directions d +- e_u +- e_v (not of unit length), e_u x e_v
         points outward.
     solid_angle : (n,) float
         [sr].
@@ -38,7 +40,7 @@ class Cells:
     neighbour : (n, 4) int32
         The cells across the edges towards -v, +u, +v, -u; -1 at the rim of a patch.
     turn : (3, 3) float or None
-        Rotation still to be applied to ``edges``; directions have had it. Most cells hit nothing.
+        Rotation of the whole grid, applied when cells are asked for.
     """
 
     direction: FloatArray
@@ -50,6 +52,11 @@ class Cells:
 
     def __len__(self) -> int:
         return len(self.direction)
+
+    def directions_of(self, cells: IntArray | slice) -> FloatArray:
+        """Return (m, 3) unit vectors of some cells, turned with the grid."""
+        d = self.direction[cells]
+        return d if self.turn is None else d @ self.turn.T
 
     def edges_of(self, cells: IntArray) -> FloatArray:
         """Return (m, 2, 3) half edges of some cells, turned with the grid."""
@@ -69,9 +76,7 @@ def _patch(axes: FloatArray, x_edges: FloatArray, y_edges: FloatArray, spacing: 
     edges[:, 0, 1] = HX * scale
     edges[:, 1, 2] = HY * scale
     # exact solid angle of a rectangle of the gnomonic plane, by its corner function
-    corner = np.arctan2(
-        x_edges[:, None] * y_edges[None], np.sqrt(1 + x_edges[:, None] ** 2 + y_edges[None] ** 2)
-    )
+    corner = np.arctan2(x_edges[:, None] * y_edges[None], np.sqrt(1 + x_edges[:, None] ** 2 + y_edges[None] ** 2))
     solid = (corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]).ravel()
     turned_edges = (edges.reshape(-1, 3) @ axes).reshape(-1, 2, 3)
     return Cells(local @ axes, turned_edges, solid, spacing, _grid_neighbours(len(x), len(y)))
@@ -112,7 +117,7 @@ def _cube(cells_per_edge: int) -> Cells:
     )
 
 
-def _lit(cells: Cells, pattern: AntennaPattern, margin: float) -> np.ndarray:  # type: ignore[type-arg]
+def _lit(cells: Cells, pattern: AntennaPattern, margin: float) -> BoolArray:
     """Return which cells reach the pattern's floor anywhere within ``margin`` of their centre."""
     _, az, el = spherical(cells.direction)
     floor = 10 ** (PATTERN_FLOOR_TWO_WAY_DB / 20)  # one way, power
@@ -124,12 +129,22 @@ def _lit(cells: Cells, pattern: AntennaPattern, margin: float) -> np.ndarray:  #
     return lit
 
 
-@functools.lru_cache(maxsize=8)
 def pattern_cells(pattern: AntennaPattern, rays: int) -> Cells:
     """Return about ``rays`` cells that cover a pattern down to -40 dB two-way, boresight along +x.
 
-    The set depends on the pattern and the number of rays alone, never on the scene.
+    The set depends on the pattern and the number of rays alone, never on the scene; the last few are kept.
     """
+    if not isinstance(pattern, Hashable):
+        return _pattern_cells(pattern, rays)
+    return _kept_pattern_cells(pattern, rays)
+
+
+@functools.lru_cache(maxsize=8)
+def _kept_pattern_cells(pattern: Hashable, rays: int) -> Cells:
+    return _pattern_cells(cast("AntennaPattern", pattern), rays)
+
+
+def _pattern_cells(pattern: AntennaPattern, rays: int) -> Cells:
     coarse = _cube(48)
     share = float(coarse.solid_angle[_lit(coarse, pattern, coarse.spacing)].sum() / (4 * np.pi))
     cells = _cube(max(4, round(np.sqrt(rays / (6 * share)))))
@@ -151,7 +166,7 @@ def turned(cells: Cells, shift: FloatArray) -> Cells:
     """
     yaw, pitch = np.degrees(np.asarray(shift) * cells.spacing)
     R = rotation_matrix((yaw, pitch, 0.0))
-    return Cells(cells.direction @ R.T, cells.edges, cells.solid_angle, cells.spacing, cells.neighbour, R)
+    return replace(cells, turn=R)
 
 
 def aimed_cells(points: FloatArray, rays: int, shift: FloatArray) -> Cells | None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from .._parallel import map_blocks, pool
+from .._typing import ComplexArray, FloatArray, IntArray, NDArray
 from ..config.profile import RadarProfile
 from ..config.scene import RadarMount, Scene
 from ..errors import InputError
@@ -24,17 +26,41 @@ __all__ = ["trace"]
 
 #: Cosines below this are treated as this: a surface seen edge-on has no usable footprint.
 _MIN_COS = 1e-4
+#: One array a column of the scatterers; each has a dtype of its own.
+Columns: TypeAlias = dict[str, NDArray[Any]]
 #: Slack of the visibility test of a point target [m].
 _POINT_SLACK_M = 1e-3
 
 
 @dataclass(frozen=True)
 class _Launch:
-    """Cells and the random numbers that belong to each, whatever they will hit."""
+    """Cells, and the generator of the random numbers that belong to each, whatever it will hit."""
 
     cells: Cells
-    speckle: ComplexArray
-    jitter: FloatArray
+    generator: np.random.Generator
+
+    def draw(self) -> tuple[ComplexArray, FloatArray]:
+        """Return (n,) unit-power complex Gaussian and (n, 2) uniform numbers in [-1, 1]."""
+        n = len(self.cells)
+        gauss = self.generator.standard_normal((n, 2))
+        gauss *= np.sqrt(0.5)
+        return gauss.view(np.complex128)[:, 0], self.generator.uniform(-1.0, 1.0, (n, 2))
+
+
+def _directions(launches: list[_Launch]) -> NDArray[np.float32]:
+    """Return (3, n) float32 directions of all cells of all launches."""
+    total = sum(len(launch.cells) for launch in launches)
+    directions = np.empty((3, total), dtype=np.float32)
+    start = 0
+    for launch in launches:
+        part = directions[:, start : start + len(launch.cells)]
+
+        def fill(rows: slice, part: NDArray[np.float32] = part, cells: Cells = launch.cells) -> None:
+            part[:, rows] = cells.directions_of(rows).T
+
+        map_blocks(fill, len(launch.cells))
+        start += len(launch.cells)
+    return directions
 
 
 def trace(
@@ -95,15 +121,20 @@ def trace(
     base = _launch_pattern(profile, rays, run_seed, frame, mount.name)
     aimed = {b: launch for b in range(len(world.bodies)) if (launch := _aim(world, b, run_seed, frame, mount.name))}
     launches = [base, *aimed.values()]
-    face = caster.cast(np.concatenate([launch.cells.direction for launch in launches]))
+    drawn = [pool().submit(launch.draw) for launch in launches]  # while the rays are under way
+    face = caster.cast(_directions(launches))
     parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
     # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
     # what else there is, and no solid angle of an object counts twice.
     own = np.isin(world.face_body, list(aimed))
     hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
     hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
-    rows = [_rows(world, launch, p, h) for launch, p, h in zip(launches, parts, hits, strict=True)]
-    rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s, run_seed, frame, mount.name))
+    rows = [
+        block
+        for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
+        for block in _all_rows(world, launch.cells, p, h, d.result())
+    ]
+    rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s))
     columns = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     return Scatterers(
         **columns,
@@ -150,16 +181,10 @@ def _prepared(scene: Scene, mount: RadarMount, time: float, backend: str) -> tup
     return world, caster
 
 
-def _draw(cells: Cells, generator: np.random.Generator) -> _Launch:
-    n = len(cells)
-    gauss = generator.standard_normal((n, 2)) * np.sqrt(0.5)
-    return _Launch(cells, gauss.view(np.complex128)[:, 0], generator.uniform(-1.0, 1.0, (n, 2)))
-
-
 def _launch_pattern(profile: RadarProfile, rays: int, seed: int, frame: int, radar: str) -> _Launch:
     shift = frame_generator(seed, frame, radar, "rays").uniform(-0.5, 0.5, 2)
-    cells = turned(pattern_cells(profile.pattern, rays), shift)
-    return _draw(cells, frame_generator(seed, frame, radar, "speckle"))
+    cells = turned(pattern_cells(profile.pattern, rays), shift)  # patterns are frozen, so they hash
+    return _Launch(cells, frame_generator(seed, frame, radar, "speckle"))
 
 
 def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> _Launch | None:
@@ -170,13 +195,30 @@ def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> _Launch 
     generator = frame_generator(seed, frame, radar, stage)
     points = world.vertices[world.vertex_start[body] : world.vertex_start[body + 1]]
     cells = aimed_cells(points, item.source.aim, generator.uniform(-0.5, 0.5, 2))
-    return None if cells is None else _draw(cells, generator)
+    return None if cells is None else _Launch(cells, generator)
 
 
-def _rows(world: World, launch: _Launch, hit: IntArray, cell: IntArray) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
-    """Return the columns of one row for each of the cells ``cell``; ``hit`` is the face each cell of the launch hits."""
-    face = hit[cell]
-    d = launch.cells.direction[cell]
+def _all_rows(
+    world: World, cells: Cells, hit: IntArray, cell: IntArray, drawn: tuple[ComplexArray, FloatArray]
+) -> list[Columns]:
+    """Return the columns of a row for each of the cells ``cell``; ``hit`` is the face each cell of the launch hits."""
+    plane = np.append(world.face_plane, np.int32(-1))[hit]  # a miss, -1, picks the last
+
+    def block(rows: slice) -> Columns:
+        index = cell[rows]
+        columns = _rows(world, cells, hit[index], index)
+        # across each edge: the plane of the neighbouring cell; none, -1, picks the last
+        beyond = np.where(cells.neighbour[index] < 0, np.int32(-2), plane[cells.neighbour[index]])
+        columns["joined"] = beyond == plane[index][:, None]
+        columns["speckle"], columns["jitter"] = drawn[0][index], drawn[1][index]
+        return columns
+
+    return map_blocks(block, len(cell)) or [block(slice(0, 0))]
+
+
+def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns:
+    """Return the columns that follow from the face each cell hits."""
+    d = cells.directions_of(cell)
     normal = world.face_normal[face]
     along = np.einsum("ij,ij->i", normal, d)
     facing = np.where(along > 0, -1.0, 1.0)
@@ -195,44 +237,29 @@ def _rows(world: World, launch: _Launch, hit: IntArray, cell: IntArray) -> dict[
         "cos_incidence": np.minimum(cos, 1.0),
         "object_id": world.object_id[body],
         "tag": world.face_tag[face],
-        "area": distance**2 * launch.cells.solid_angle[cell] / cos,
+        "area": distance**2 * cells.solid_angle[cell] / cos,
         "velocity": velocity,
         "normal": normal * facing[:, None],
         "material": world.face_material[face],
-        "footprint": launch.cells.edges_of(cell),
-        "joined": _joined(world, launch.cells, hit, cell),
-        "speckle": launch.speckle[cell],
-        "jitter": launch.jitter[cell],
+        "footprint": cells.edges_of(cell),
         "rcs": np.full(len(cell), np.nan),
         "bounces": np.ones(len(cell), dtype=np.uint8),
     }
 
 
-def _joined(world: World, cells: Cells, hit: IntArray, cell: IntArray) -> BoolArray:
-    """Return (m, 4) whether the surface goes on in the same plane across each edge of a cell."""
-    of_cell = np.append(world.face_plane, np.int32(-1))[hit]  # a miss, -1, picks the last
-    beyond = np.append(of_cell, np.int32(-2))[cells.neighbour[cell]]  # -1 picks the last
-    same: BoolArray = beyond == of_cell[cell][:, None]
-    return same
-
-
-def _point_rows(
-    scene: Scene, world: World, caster: RayCaster, time: float, seed: int, frame: int, radar: str
-) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
+def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> Columns:
     """Return the columns of the point targets nothing stands before."""
     targets, eye = scene.point_targets, world.radar_state
     where = np.array([np.add(t.xyz_m, np.multiply(t.velocity_mps, time)) for t in targets]).reshape(-1, 3)
     position = (where - eye.origin) @ eye.rotation
     distance = np.linalg.norm(position, axis=1)
     d = position / np.maximum(distance, 1e-12)[:, None]
-    face = caster.cast(d)
+    face = caster.cast(np.ascontiguousarray(d.T, dtype=np.float32))
     along = np.abs(np.einsum("ij,ij->i", world.face_normal[face], d)) if world.face_normal.size else np.ones(len(d))
     ahead = np.abs(world.face_offset[face]) if world.face_normal.size else np.full(len(d), np.inf)
     hidden = (face >= 0) & (ahead < (distance - _POINT_SLACK_M) * along)
     seen = np.flatnonzero(~hidden & (distance > 0))
-    motion = [
-        relative_motion(body_state_of_point(w, t.velocity_mps), eye) for w, t in zip(where, targets, strict=True)
-    ]
+    motion = [relative_motion(body_state_of_point(w, t.velocity_mps), eye) for w, t in zip(where, targets, strict=True)]
     velocity = np.array([drift + np.cross(turn, p) for (drift, turn), p in zip(motion, position, strict=True)])
     velocity = velocity.reshape(-1, 3)[seen]
     n = len(seen)
