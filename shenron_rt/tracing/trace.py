@@ -126,7 +126,7 @@ def trace(
     parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
     # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
     # what else there is, and no solid angle of an object counts twice.
-    own = np.isin(world.face_body, list(aimed))
+    own = np.append(np.isin(world.face_body, list(aimed)), False)  # a miss, -1, reads the last: scenes may be empty
     hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
     hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
     rows = [
