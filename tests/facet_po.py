@@ -1,8 +1,8 @@
 """Physical optics on the flat facets of a mesh, written apart from the package: the tests' independent yardstick.
 
 Each triangle's phase is taken as linear about its centroid and integrated in closed form; the wave is spherical from
-the radar's position; facets seen from behind or hidden (their centroid is) do not count. e^{+jwt}, metal plate facing the
-radar: positive real.
+the radar's position; facets seen from behind or hidden (their centroid is) do not count. e^{+jwt}, metal plate facing
+the radar: positive real.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 def _triangle_transform(u, v):
     """Return integral_0^1 integral_0^(1-a) exp(-j (u a + v b)) db da for arrays u, v."""
 
-    # The transform is symmetric in the three corners up to a phase, so divide by the largest phase difference.
+    # Symmetric in the three corners up to a phase: divide by the largest phase difference.
     def mean_phasor(x):
         return np.exp(-0.5j * x) * np.sinc(x / (2.0 * np.pi))
 

@@ -78,6 +78,8 @@ def _item(text: str, name: str, recipe: Recipe, item: str) -> list[tuple[str, fl
             known = did_you_mean(key, [*recipe.required, *recipe.optional])
             raise InputError(f"shape {text!r}: unknown parameter {key!r} of {name}; {known}")
         return [(key, _length(text, key, value))]
+    if recipe.forms and not item[:1].isdigit():
+        raise InputError(f"shape {text!r}: cannot read {item!r}; {name} is one of {', '.join(recipe.forms)}")
     dims = recipe.dims or recipe.required
     numbers = item.split("x")
     if not dims or len(numbers) != len(dims):

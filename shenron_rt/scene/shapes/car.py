@@ -28,7 +28,7 @@ def car() -> list[Piece]:
     """
     pieces = [*_body(), *_cabin(), *_wheels()]
     for side in (1.0, -1.0):
-        housing = ellipsoid([0.07, 0.10, 0.065], 5, [0.62, side * 0.96, 1.02])
+        housing = ellipsoid([0.07, 0.10, 0.065], 5, [0.62, side * 0.95, 0.985])
         name = "left mirror" if side > 0 else "right mirror"
         pieces.append(Piece(name, "car_paint", SemanticTag.Car, *housing))
     pieces.append(Piece("front plate", "metal", SemanticTag.Car, *_number_plate(0.0, 0.42)))
