@@ -20,8 +20,14 @@ __all__ = ["Attribution", "attribute"]
 
 #: Echoes farther than this from the detection's cell [unpadded bins] do not count for it.
 _REACH_BINS = 1
-#: Points per bin, and per half wavelength aperture, of the response tables.
+#: Echoes are first gathered in parts of a bin, and of the azimuth grid; the response is taken at the part's middle.
+_PARTS = 2
+#: Steps of the sine of elevation in which echoes are gathered for an array with rows.
+_ELEVATION_STEPS = 32
+#: Points per bin, and per wavelength of aperture, of the response tables.
 _TABLE_STEP = 32
+#: Largest dense key space of the gathering; above it keys are sorted.
+_DENSE_KEYS = 1 << 23
 
 
 @dataclass(frozen=True)
@@ -35,51 +41,119 @@ class Attribution:
 
 
 @dataclass(frozen=True)
-class _Echoes:
-    """Echoes in measured coordinates: range bin, unfolded Doppler bin, direction cosines, range rate."""
+class _Clusters:
+    """Echoes of one object and tag that share a part of a cell and a beam.
 
-    range_bin: FloatArray
-    doppler_bin: FloatArray
+    ``part`` (n, 2) integer position in parts of a bin, ``cosines`` (n, 2) direction along y and z, ``object_id``,
+    ``tag``, ``phasor`` the sum of the coherent echoes about the middle of the array, ``speckle`` the power of the
+    others, ``power`` of all, ``velocity`` their power-weighted mean [m/s].
+    """
+
+    part: IntArray
+    cosines: FloatArray
+    object_id: IntArray
+    tag: IntArray
+    phasor: ComplexArray
+    speckle: FloatArray
+    power: FloatArray
     velocity: FloatArray
 
-    @classmethod
-    def of(cls, returns: Returns, cube: RadarCube) -> _Echoes:
-        p = cube.profile
-        distance = np.sqrt(np.einsum("ni,ni->n", returns.position, returns.position))
-        radial = np.einsum("ni,ni->n", returns.position, returns.velocity) / np.maximum(distance, 1e-9)
-        doppler_hz = 2 * radial / SPEED_OF_LIGHT * p.center_hz
-        # the beat frequency of a moving echo is k tau + Doppler
-        apparent = distance + doppler_hz * SPEED_OF_LIGHT / (2 * p.slope_hz_per_s)
-        bin_hz = 1 / (cube.n_fft[1] * p.loop_period_s)
-        return cls(apparent / cube.range_step_m, doppler_hz / bin_hz + cube.n_fft[1] // 2, radial)
+
+def _stride(cube: RadarCube) -> tuple[int, int]:
+    """Return the bins of the transforms per bin without zero padding."""
+    w = cube.profile.waveform
+    return -(-cube.n_fft[0] // w.samples), -(-cube.n_fft[1] // w.chirps)
 
 
-def _response(name: str, n: int, n_fft: int, offset: FloatArray) -> FloatArray:
-    """Return the real response of a window at offsets [bins], from a table."""
-    w = window(name, n)
-    centre = np.sum(w * np.arange(n)) / w.sum()
-    reach = float(np.max(np.abs(offset), initial=1.0)) + 1
-    x = np.linspace(-reach, reach, int(2 * reach * _TABLE_STEP) + 1)
-    table = np.cos(2 * np.pi / n_fft * x[:, None] * (np.arange(n) - centre)) @ w / w.sum()
-    return np.asarray(np.interp(offset, x, table))
-
-
-def _pairs(cube: RadarCube, echoes: _Echoes, row: IntArray, column: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (echo, peak cell) index pairs that lie within reach of each other; peaks are the unique cells."""
+def _parts(cube: RadarCube, returns: Returns) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return where the echoes show in the cube, in parts of a bin, with their distance [m] and range rate [m/s]."""
+    p = cube.profile
+    x, v = returns.position, returns.velocity
+    distance = np.maximum(np.sqrt(np.einsum("ni,ni->n", x, x)), 1e-9)
+    radial = np.einsum("ni,ni->n", x, v) / distance
+    doppler_hz = radial * (2 * p.center_hz / SPEED_OF_LIGHT)
+    # the beat frequency of a moving echo is k tau + Doppler
+    apparent = distance + doppler_hz * (SPEED_OF_LIGHT / (2 * p.slope_hz_per_s))
     n_range, n_velocity, _ = cube.data.shape
-    stride = [-(-cube.n_fft[0] // cube.profile.waveform.samples), -(-cube.n_fft[1] // cube.profile.waveform.chirps)]
-    owner = np.full((n_range, n_velocity), -1, dtype=np.int64)
-    owner[row, column] = np.arange(len(row))
-    near = np.zeros((n_range, n_velocity), dtype=bool)
-    shifts = [np.arange(-_REACH_BINS * k, _REACH_BINS * k + 1) for k in stride]
-    di, dj = (a.ravel() for a in np.meshgrid(*shifts, indexing="ij"))
-    near[(row[:, None] + di) % n_range, (column[:, None] + dj) % n_velocity] = True
-    i = np.rint(echoes.range_bin).astype(np.int64) % n_range
-    j = np.rint(echoes.doppler_bin).astype(np.int64) % n_velocity
-    close = np.flatnonzero(near[i, j])
-    cell = owner[(i[close, None] + di) % n_range, (j[close, None] + dj) % n_velocity]
-    which, shift = np.nonzero(cell >= 0)
-    return close[which], cell[which, shift]
+    row = np.rint(apparent * (_PARTS / cube.range_step_m)).astype(np.int32) % (_PARTS * n_range)
+    bins = doppler_hz * (_PARTS * cube.n_fft[1] * p.loop_period_s)
+    column = (np.rint(bins).astype(np.int32) + _PARTS * (n_velocity // 2)) % (_PARTS * n_velocity)
+    return row, column, distance, radial
+
+
+def _near(cube: RadarCube, row: IntArray, column: IntArray) -> IntArray:
+    """Return a map of the parts of cells: a running number for those within reach of a peak, -1 elsewhere."""
+    n_range, n_velocity, _ = cube.data.shape
+    reach = [_REACH_BINS * _PARTS * k for k in _stride(cube)]
+    di, dj = (a.ravel() for a in np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"))
+    number = np.full((_PARTS * n_range, _PARTS * n_velocity), -1, dtype=np.int32)
+    i = (_PARTS * row[:, None] + di) % (_PARTS * n_range)
+    j = (_PARTS * column[:, None] + dj) % (_PARTS * n_velocity)
+    number[i, j] = 0
+    inside = np.nonzero(number == 0)
+    number[inside] = np.arange(len(inside[0]))
+    return number
+
+
+def _compact(keys: list[IntArray], sizes: list[int]) -> tuple[IntArray, int]:
+    """Number the combinations of keys that occur; return the number of every row and how many there are."""
+    total = int(np.prod([float(s) for s in sizes]))
+    packed = np.zeros(len(keys[0]), dtype=np.int64)
+    for key, size in zip(keys, sizes, strict=True):
+        packed = packed * size + key
+    if total > _DENSE_KEYS:
+        found, number = np.unique(packed, return_inverse=True)
+        return number.ravel(), len(found)
+    seen = np.zeros(total, dtype=bool)
+    seen[packed] = True
+    found = np.flatnonzero(seen)
+    lookup = np.zeros(total, dtype=np.int32)
+    lookup[found] = np.arange(len(found))
+    return lookup[packed], len(found)
+
+
+def _gather(cube: RadarCube, returns: Returns, row: IntArray, column: IntArray) -> _Clusters:
+    """Gather the echoes near the peaks."""
+    p = cube.profile
+    i, j, distance, radial = _parts(cube, returns)
+    number = _near(cube, row, column)
+    cell = number[i, j]
+    close = np.flatnonzero(cell >= 0)
+    cosines = returns.position[close, 1:] / distance[close, None]
+    steps = max(64, len(cube.azimuth_sine)), _ELEVATION_STEPS if angle.has_elevation(p.positions_m, p.wavelength_m) else 1
+    beams = [np.minimum(((cosines[:, k] + 1) / 2 * n).astype(np.int64), n - 1) for k, n in enumerate(steps)]
+    label = returns.object_id[close].astype(np.int64) * 256 + returns.tag[close]
+    labels = np.unique(label)
+    which = np.searchsorted(labels, label)
+    sizes = [int(number.max()) + 1, len(labels), *steps]
+    cluster, count = _compact([cell[close], which, *beams], sizes)
+    amplitude, coherent = returns.amplitude[close], returns.coherent[close]
+    power = amplitude.real**2 + amplitude.imag**2
+    total = np.bincount(cluster, power, count)
+    member = np.zeros(count, dtype=np.int64)
+    member[cluster] = np.arange(len(close))
+    some = close[member]
+    return _Clusters(
+        part=np.stack([i[some], j[some]], axis=1),
+        cosines=cosines[member],
+        object_id=returns.object_id[some].astype(np.int64),
+        tag=returns.tag[some],
+        phasor=_phasor_sum(cube, returns, close[coherent], distance, cluster[coherent], count),
+        speckle=np.bincount(cluster, np.where(coherent, 0.0, power), count),
+        power=total,
+        velocity=np.bincount(cluster, power * radial[close], count) / np.maximum(total, 1e-300),
+    )
+
+
+def _phasor_sum(
+    cube: RadarCube, returns: Returns, rows: IntArray, distance: FloatArray, cluster: IntArray, count: int
+) -> ComplexArray:
+    """Sum a e^{j 2 pi f_c tau} of coherent echoes per cluster, at the middle of the array."""
+    p = cube.profile
+    middle = p.positions_m.mean(axis=0)
+    path = 2 * distance[rows] - returns.position[rows] @ middle / distance[rows]
+    phasor = returns.amplitude[rows] * np.exp(2j * np.pi / p.wavelength_m * path)
+    return np.bincount(cluster, phasor.real, count) + 1j * np.bincount(cluster, phasor.imag, count)
 
 
 def attribute(
@@ -95,116 +169,85 @@ def attribute(
     row, column : (n,) int
         Peak cells.
     sine, elevation : (n,) float
-        Direction cosines of the beams (y, z); NaN elevation counts as 0.
+        Direction cosines of the beams (y, z).
 
     Notes
     -----
-    Each echo is weighted with the response of both windows and of the array; an object's coherent echoes add as
-    phasors, its incoherent ones as powers. An object below the expected noise of the beamformed cell does not count.
+    Echoes are gathered in half bins; each part is weighted with the response of both windows and of the array. An
+    object's coherent echoes add as phasors, its incoherent ones as powers. An object below the expected noise of the
+    beamformed cell does not count.
     """
     n = len(row)
     none = Attribution(np.full(n, -1), np.zeros(n, dtype=np.uint8), np.zeros(n), np.full(n, np.nan))
     if n == 0 or len(returns) == 0:
         return none
-    cells, of_cell = np.unique(np.stack([row, column], axis=1), axis=0, return_inverse=True)
-    echoes = _Echoes.of(returns, cube)
-    echo, cell = _pairs(cube, echoes, cells[:, 0], cells[:, 1])
-    # several beams may look at one cell: repeat its echoes for each of them
-    order = np.argsort(of_cell.ravel(), kind="stable")
-    counts = np.bincount(of_cell.ravel(), minlength=len(cells))
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    times = counts[cell]
-    echo_pair = np.repeat(echo, times)
-    within = np.arange(len(echo_pair)) - np.repeat(np.cumsum(times) - times, times)
-    peak = order[np.repeat(first[cell], times) + within]
-    if not len(echo_pair):
+    clusters = _gather(cube, returns, row, column)
+    if not len(clusters.tag):
         return none
-    weight, phasor = _weights(cube, returns, echoes, echo_pair, peak, row, column, sine, np.nan_to_num(elevation))
-    return _strongest(cube, returns, echoes, echo_pair, peak, weight, phasor, none)
+    off = [_offset(clusters.part[:, k], at, cube.data.shape[k]) for k, at in enumerate((row, column))]
+    reach = [_REACH_BINS * k for k in _stride(cube)]
+    peak, cluster = np.nonzero((np.abs(off[0]) <= reach[0]) & (np.abs(off[1]) <= reach[1]))
+    off_r, off_d = off[0][peak, cluster], off[1][peak, cluster]
+    w = cube.profile.waveform
+    weight = _response(cube.range_window, w.samples, cube.n_fft[0], off_r)
+    weight = weight * _response(cube.doppler_window, w.chirps, cube.n_fft[1], off_d)
+    ds, de = clusters.cosines[cluster, 0] - sine[peak], clusters.cosines[cluster, 1] - elevation[peak]
+    return _strongest(cube, clusters, peak, cluster, weight * _array_response(cube, ds, de), n)
 
 
-def _weights(
-    cube: RadarCube,
-    returns: Returns,
-    echoes: _Echoes,
-    echo: IntArray,
-    peak: IntArray,
-    row: IntArray,
-    column: IntArray,
-    sine: FloatArray,
-    elevation: FloatArray,
-) -> tuple[FloatArray, ComplexArray]:
-    """Return the real response of each (echo, peak) pair and the echo's phasor about the middle of the array."""
+def _offset(part: IntArray, at: IntArray, size: int) -> FloatArray:
+    """Return the distance (n_peak, n_cluster) of parts from peak cells [bins], the short way round."""
+    off = part[None, :] / _PARTS - at[:, None]
+    return np.asarray((off + size / 2) % size - size / 2, dtype=np.float64)
+
+
+def _response(name: str, n: int, n_fft: int, offset: FloatArray) -> FloatArray:
+    """Return the real response of a window at offsets of whole parts of a bin."""
+    w = window(name, n)
+    centre = np.sum(w * np.arange(n)) / w.sum()
+    index = np.rint(np.abs(offset) * _PARTS).astype(np.int64)
+    x = np.arange(int(index.max(initial=0)) + 1) / _PARTS
+    table = np.cos(2 * np.pi / n_fft * x[:, None] * (np.arange(n) - centre)) @ w / w.sum()
+    return np.asarray(table[index], dtype=np.float64)
+
+
+def _array_response(cube: RadarCube, ds: FloatArray, de: FloatArray) -> FloatArray:
+    """Return the real part of the array factor about its middle; it depends on differences of cosines only."""
     p = cube.profile
-    n_range, n_velocity, _ = cube.data.shape
-    off_r = (echoes.range_bin[echo] - row[peak] + n_range / 2) % n_range - n_range / 2
-    off_d = (echoes.doppler_bin[echo] - column[peak] + n_velocity / 2) % n_velocity - n_velocity / 2
-    weight = _response(cube.range_window, p.waveform.samples, cube.n_fft[0], off_r)
-    weight = weight * _response(cube.doppler_window, p.waveform.chirps, cube.n_fft[1], off_d)
-    used, of_used = np.unique(echo, return_inverse=True)
-    position = returns.position[used]
-    distance = np.maximum(np.linalg.norm(position, axis=1), 1e-9)
-    cosines = position / distance[:, None]
     centred = p.positions_m - p.positions_m.mean(axis=0)
-    array_phase = -2 * np.pi / p.wavelength_m * (cosines @ p.positions_m.mean(axis=0))
-    phasor = returns.amplitude[used] * np.exp(1j * (4 * np.pi / p.wavelength_m * distance + array_phase))
-    # the array's response depends on the difference of direction cosines only
-    ds = cosines[of_used, 1] - sine[peak]
-    de = (
-        cosines[of_used, 2] - elevation[peak]
-        if angle.has_elevation(p.positions_m, p.wavelength_m)
-        else np.zeros_like(ds)
-    )
-    return weight * _array_response(centred, p.wavelength_m, ds, de), phasor[of_used]
-
-
-def _array_response(centred: FloatArray, wavelength_m: float, ds: FloatArray, de: FloatArray) -> FloatArray:
-    """Return the real part of the array factor at differences of direction cosines, summed in parts over channels."""
+    if not angle.has_elevation(p.positions_m, p.wavelength_m):
+        points = int(4 * _TABLE_STEP * (1 + np.ptp(centred[:, 1]) / p.wavelength_m))
+        x = np.linspace(0.0, 2.0, points)
+        table = np.cos(2 * np.pi / p.wavelength_m * x[:, None] * centred[:, 1]).mean(axis=1)
+        return np.asarray(np.interp(np.abs(ds), x, table), dtype=np.float64)
     out = np.zeros(len(ds))
-    columns, count = np.unique(np.round(centred[:, 1:], 9), axis=0, return_counts=True)
-    if not np.any(columns[:, 1]) or not np.any(de):
-        reach = float(np.max(np.abs(ds), initial=0.0)) + 1e-3
-        points = int(2 * reach * _TABLE_STEP * (1 + np.ptp(columns[:, 0]) / wavelength_m)) + 3
-        x = np.linspace(-reach, reach, points)
-        table = np.cos(2 * np.pi / wavelength_m * x[:, None] * columns[:, 0]) @ count / count.sum()
-        return np.asarray(np.interp(ds, x, table))
-    for (y, z), times in zip(columns, count, strict=True):
-        out += times * np.cos(2 * np.pi / wavelength_m * (y * ds + z * de))
-    return np.asarray(out / count.sum(), dtype=np.float64)
+    for y, z in centred[:, 1:]:
+        out += np.cos(2 * np.pi / p.wavelength_m * (y * ds + z * de))
+    return out / len(centred)
 
 
 def _strongest(
-    cube: RadarCube,
-    returns: Returns,
-    echoes: _Echoes,
-    echo: IntArray,
-    peak: IntArray,
-    weight: FloatArray,
-    phasor: ComplexArray,
-    none: Attribution,
+    cube: RadarCube, clusters: _Clusters, peak: IntArray, cluster: IntArray, weight: FloatArray, n: int
 ) -> Attribution:
-    n = len(none.power)
-    ids, of_id = np.unique(returns.object_id[echo], return_inverse=True)
-    key = peak * len(ids) + of_id.ravel()
-    coherent = returns.coherent[echo]
-    seen = phasor * weight
-    shape = (n, len(ids))
-    own = seen.real**2 + seen.imag**2
-    parts = [np.where(coherent, seen.real, 0.0), np.where(coherent, seen.imag, 0.0), np.where(coherent, 0.0, own)]
-    re, im, speckle = (np.bincount(key, part, n * len(ids)).reshape(shape) for part in parts)
+    ids, of_id = np.unique(clusters.object_id, return_inverse=True)
+    key = peak * len(ids) + of_id.ravel()[cluster]
+    seen = clusters.phasor[cluster] * weight
+    parts = (seen.real, seen.imag, clusters.speckle[cluster] * weight**2)
+    re, im, speckle = (np.bincount(key, part, n * len(ids)).reshape(n, len(ids)) for part in parts)
     power = re**2 + im**2 + speckle
     best = np.argmax(power, axis=1)
     most = power[np.arange(n), best]
     found = most > cube.noise_power_w / cube.profile.n_virtual
-    # tag and velocity: those of the object's strongest echo in the cell
-    mine = np.flatnonzero(best[peak] == of_id.ravel())
+    # tag and velocity: those of the object's strongest cluster in the cell
+    own = clusters.power[cluster] * weight**2
+    mine = np.flatnonzero(best[peak] == of_id.ravel()[cluster])
     mine = mine[np.lexsort((own[mine], peak[mine]))]
     last = np.flatnonzero(np.diff(peak[mine], append=-1))
     top = np.zeros(n, dtype=np.int64)
-    top[peak[mine[last]]] = echo[mine[last]]
+    top[peak[mine[last]]] = cluster[mine[last]]
     return Attribution(
-        np.where(found, ids[best].astype(np.int64), -1),
-        np.where(found, returns.tag[top], 0).astype(np.uint8),
+        np.where(found, ids[best], -1),
+        np.where(found, clusters.tag[top], 0).astype(np.uint8),
         np.where(found, most, 0.0),
-        np.where(found, echoes.velocity[top], np.nan),
+        np.where(found, clusters.velocity[top], np.nan),
     )
