@@ -211,7 +211,8 @@ class Elements:
             to_element = np.linalg.norm(target[:, None] - element, axis=2)
             excess = np.sum(element**2, axis=1) - 2 * target @ element.T
             legs.append(excess / (to_element + np.linalg.norm(target, axis=1)[:, None]))
-        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), -1)
+        pairs = len(self.tx_m) * len(self.rx_m)  # -1 could not be told where there is no peak at all
+        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), pairs)
         phasor = np.exp(2j * np.pi / self.wavelength_m * path)
         return np.asarray(phasor, dtype=np.complex128), path / (2 * self.range_step_m)
 
