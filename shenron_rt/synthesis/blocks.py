@@ -158,17 +158,38 @@ def group_points(
         half = max(block.half_s for block in cut(clock, chirp_start_s, count))
         curvature, neglected = bound.phases(clock, todo, half)
         fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
-        for rows in _by_curvature(curvature[fits], tolerance):
+        for rows in _by_curvature(curvature[fits], 4 * tolerance):
             groups.append(Group(count, todo[fits][rows]))
         todo = todo[~fits]
         count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
     if len(todo):
         groups.append(Group(0, todo))
-    return [Group(g.blocks, rows) for g in groups for rows in _chunks(g.rows)]
+    order = _delay_rate_order(points)
+    return [
+        Group(g.blocks, rows)
+        for g in groups
+        for rows in np.array_split(_in_order(g.rows, order), -(-len(g.rows) // CHUNK))
+    ]
 
 
-def _chunks(rows: IntArray) -> list[IntArray]:
-    return [np.sort(part) for part in np.array_split(rows, -(-len(rows) // CHUNK))]
+def _delay_rate_order(points: Points) -> IntArray:
+    """Return (n,) cell numbers by range rate, then range: points in this order are near each other on the grid."""
+    if not len(points):
+        return np.zeros(0, dtype=np.int16)
+    r = np.sqrt(np.einsum("qi,qi->q", points.position, points.position))
+    rate = np.einsum("qi,qi->q", points.position, points.velocity) / np.maximum(r, 1e-9)
+    cells = [
+        np.minimum((x - x.min()) * (n / max(float(np.ptp(x)), 1e-9)), n - 1).astype(np.int16)
+        for x, n in ((rate, 64), (r, 256))
+    ]
+    found: IntArray = cells[0] * np.int16(256) + cells[1]
+    return found
+
+
+def _in_order(rows: IntArray, order: IntArray) -> IntArray:
+    # a stable sort of 16-bit numbers is a radix sort
+    found: IntArray = rows[np.argsort(order[rows], kind="stable")]
+    return found
 
 
 @dataclass(frozen=True)
@@ -219,27 +240,30 @@ class _Bounds:
 
 
 def _by_curvature(phase: FloatArray, tolerance: float) -> list[IntArray]:
-    """Cut sorted curvature phases into groups of small spread where that saves transforms.
+    """Cut curvature phases into groups of small spread where that saves transforms.
 
-    Dynamic programming over a fixed set of edges with the measured costs above.
+    Dynamic programming over fixed edges with the measured costs above; ``tolerance`` is that of the expansion.
     """
     if not len(phase):
         return []
-    order = np.argsort(phase, kind="stable")
-    ordered = phase[order]
-    steps = np.unique(np.concatenate([[0.0], np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
-    at = np.unique(np.concatenate([[0], np.searchsorted(ordered, steps[1:], side="right"), [len(ordered)]]))
+    edges = np.unique(np.concatenate([np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
+    cell = np.searchsorted(edges, phase)
+    counts = np.bincount(cell, minlength=len(edges) + 1)
+    at = np.concatenate([[0], np.flatnonzero(counts) + 1])
+    before = np.concatenate([[0], np.cumsum(counts)])
+    lower = np.concatenate([[0.0], edges])
     best, back = [0.0], [0]
     for j in range(1, len(at)):
         costs = []
         for i in range(j):
-            terms = rank((ordered[at[j] - 1] - ordered[at[i]]) / 2, tolerance)
-            size = int(at[j] - at[i])
+            top = edges[min(at[j] - 1, len(edges) - 1)]
+            terms = rank((top - lower[at[i]]) / 2, tolerance)
+            size = int(before[at[j]] - before[at[i]])
             costs.append(best[i] + COST_SETUP + COST_GRID * terms + size * (COST_POINT + COST_SPREAD * terms))
         back.append(int(np.argmin(costs)))
         best.append(min(costs))
     groups, j = [], len(at) - 1
     while j > 0:
-        groups.append(order[at[back[j]] : at[j]])
+        groups.append(np.flatnonzero((cell >= at[back[j]]) & (cell < at[j])))
         j = back[j]
     return groups[::-1]

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._typing import ComplexArray, FloatArray
 
-__all__ = ["MAX_AMPLITUDE", "LowRank", "monomial", "rank", "series_orders"]
+__all__ = ["MAX_AMPLITUDE", "LowRank", "monomials", "rank", "series_orders"]
 
 #: Largest amplitude of a factor [rad]; beyond it the frame is cut into shorter blocks.
 MAX_AMPLITUDE = 3.0
@@ -47,7 +47,7 @@ def series_orders(amplitudes: Sequence[float], tolerance: float) -> list[Orders]
     Returns
     -------
     list of tuple of int
-        (p_1, p_2 ...) of every term kept, the largest first; (0, 0 ...) always leads.
+        (p_1, p_2 ...) of every term kept, by total order; with a term comes the one it is a multiple of.
     """
     # factors cut at tolerance / 100 leave products whose sum is a small part of the tolerance
     factors = [_factor_weights(a, tolerance / 100) for a in amplitudes]
@@ -55,11 +55,22 @@ def series_orders(amplitudes: Sequence[float], tolerance: float) -> list[Orders]
         (math.prod(w[p] for w, p in zip(factors, orders, strict=True)), orders)
         for orders in itertools.product(*(range(len(w)) for w in factors))
     ]
-    terms.sort(key=lambda item: (sum(item[1]) > 0, -item[0], item[1]))
+    terms.sort(key=lambda item: (any(item[1]), -item[0], item[1]))
     left = 0.0
     while len(terms) > 1 and left + terms[-1][0] <= 0.9 * tolerance:
         left += terms.pop()[0]
-    return [orders for _, orders in terms]
+    kept = {orders for _, orders in terms}
+    for orders in list(kept):
+        while any(orders):
+            orders = _less(orders)[0]
+            kept.add(orders)
+    return sorted(kept, key=lambda orders: (sum(orders), orders))
+
+
+def _less(orders: Orders) -> tuple[Orders, int]:
+    """Return the term that times one factor makes this one, and the factor's index."""
+    i = next(i for i, p in enumerate(orders) if p)
+    return tuple(p - (j == i) for j, p in enumerate(orders)), i
 
 
 def _factor_weights(amplitude: float, tolerance: float) -> list[float]:
@@ -71,16 +82,14 @@ def _factor_weights(amplitude: float, tolerance: float) -> list[float]:
     return weights
 
 
-def monomial(values: Sequence[FloatArray], orders: Orders, known: dict[Orders, FloatArray]) -> FloatArray:
-    """Return prod_i values_i^p_i, reusing the monomial of one order less from ``known``, which it extends."""
-    if orders not in known:
-        i = next((i for i, p in enumerate(orders) if p), None)
-        if i is None:
-            known[orders] = np.ones_like(values[0])
-        else:
-            less = tuple(p - (j == i) for j, p in enumerate(orders))
-            known[orders] = values[i] * monomial(values, less, known) if any(less) else values[i]
-    return known[orders]
+def monomials(values: Sequence[FloatArray], orders: list[Orders], out: FloatArray) -> FloatArray:
+    """Write prod_i values_i^p_i of every term of :func:`series_orders` into the rows of ``out``, and return it."""
+    place = {o: i for i, o in enumerate(orders)}
+    out[0] = 1.0
+    for row, o in zip(out[1:], orders[1:], strict=True):
+        less, i = _less(o)
+        np.multiply(values[i], out[place[less]], out=row)
+    return out
 
 
 @dataclass(frozen=True)
@@ -93,15 +102,22 @@ class LowRank:
         The L monomials.
     left : (L, R) complex
     right : (R, L) complex
+    weights : (R,) float
+        Largest share of a term in exp(j psi), RMS over the samples, among the echoes it was fitted to.
     """
 
     orders: list[Orders]
     left: ComplexArray
     right: ComplexArray
+    weights: FloatArray
 
     @classmethod
     def fit(
-        cls, amplitudes: Sequence[float], parameters: Sequence[FloatArray], shapes: Sequence[FloatArray], tolerance: float
+        cls,
+        amplitudes: Sequence[float],
+        parameters: Sequence[FloatArray],
+        shapes: Sequence[FloatArray],
+        tolerance: float,
     ) -> LowRank:
         """Find the smallest R whose RMS error over the samples is below ``tolerance`` for every echo given.
 
@@ -117,13 +133,14 @@ class LowRank:
         """
         orders = series_orders(amplitudes, tolerance / 10)
         if len(orders) == 1:
-            return cls(orders, np.ones((1, 1), np.complex128), np.ones((1, 1), np.complex128))
-        scale = np.array([math.prod(a**p / math.factorial(p) for a, p in zip(amplitudes, o, strict=True)) for o in orders])
+            one = np.ones((1, 1), dtype=np.complex128)
+            return cls(orders, one, one, np.ones(1))
+        scale = np.array(
+            [math.prod(a**p / math.factorial(p) for a, p in zip(amplitudes, o, strict=True)) for o in orders]
+        )
         scale = scale * np.array([1j ** (sum(o) % 4) for o in orders])
-        known_x: dict[Orders, FloatArray] = {}
-        known_b: dict[Orders, FloatArray] = {}
-        x = np.stack([monomial(parameters, o, known_x) for o in orders], axis=1)
-        b = np.stack([monomial(shapes, o, known_b) for o in orders], axis=1) * (scale / np.sqrt(len(shapes[0])))
+        x = monomials(parameters, orders, np.empty((len(orders), len(parameters[0])))).T
+        b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
         q_x, r_x = np.linalg.qr(x)
         _, r_b = np.linalg.qr(b.conj())
         u, s, vh = np.linalg.svd(r_x @ r_b.conj().T)
@@ -133,39 +150,32 @@ class LowRank:
         kept = max(1, int(np.count_nonzero(tails > tolerance)))
         left = r_b.conj().T @ vh[:kept].conj().T
         right = (u[:, :kept].conj().T @ r_x) * scale / s[:kept, None]
-        return cls(orders, left, right)
+        return cls(orders, left, right, np.sqrt(parts[:, :kept].max(axis=0)))
 
     def strengths(self, amplitude: ComplexArray, parameters: Sequence[FloatArray]) -> ComplexArray:
         """Return amplitude_q times the left factor, (R, n), in the precision of ``amplitude``."""
         if len(self.orders) == 1:
             return amplitude[None] * self.left.astype(amplitude.dtype)
-        matrix = np.concatenate([self.left.T.real, self.left.T.imag]).astype(amplitude.real.dtype)
-        out = np.empty((self.left.shape[1], len(amplitude)), dtype=amplitude.dtype)
-        rows = np.empty((len(self.orders), _COLUMNS), dtype=matrix.dtype)
-        for first in range(0, len(amplitude), _COLUMNS):
-            part = slice(first, first + _COLUMNS)
-            _fill(rows, self.orders, [x[part] for x in parameters])
-            both = matrix @ rows[:, : len(amplitude[part])]
-            factor = out[:, part]
-            factor.real, factor.imag = both[: len(out)], both[len(out) :]
-            factor *= amplitude[part]
+        out = np.empty((len(self.right), len(amplitude)), dtype=amplitude.dtype)
+        _combine(self.left.T, self.orders, parameters, out)
+        out *= amplitude
         return out
 
-    def waves(self, shapes: Sequence[FloatArray]) -> ComplexArray:
-        """Return the right factor at samples, (R, n)."""
-        matrix = np.concatenate([self.right.real, self.right.imag])
-        out = np.empty((len(self.right), len(shapes[0])), dtype=np.complex128)
-        rows = np.empty((len(self.orders), _COLUMNS))
-        for first in range(0, out.shape[1], _COLUMNS):
-            part = slice(first, first + _COLUMNS)
-            _fill(rows, self.orders, [b[part] for b in shapes])
-            both = matrix @ rows[:, : out[:, part].shape[1]]
-            out[:, part].real, out[:, part].imag = both[: len(out)], both[len(out) :]
+    def waves(self, shapes: Sequence[FloatArray], count: int) -> ComplexArray:
+        """Return the right factor at ``count`` samples, (R, count)."""
+        if len(self.orders) == 1:
+            return np.repeat(self.right, count, axis=1)
+        out = np.empty((len(self.right), count), dtype=np.complex128)
+        _combine(self.right, self.orders, shapes, out)
         return out
 
 
-def _fill(rows: FloatArray, orders: list[Orders], values: Sequence[FloatArray]) -> None:
-    """Write the monomials of ``values`` into the rows, each from one of lower order where that is among them."""
-    known: dict[Orders, FloatArray] = {}
-    for row, o in zip(rows, orders, strict=True):
-        row[: len(values[0])] = monomial(values, o, known)
+def _combine(matrix: ComplexArray, orders: list[Orders], values: Sequence[FloatArray], out: ComplexArray) -> None:
+    """Write matrix (R, L) times the monomials (L, n) into ``out``, some columns at a time."""
+    parts = np.concatenate([matrix.real, matrix.imag]).astype(out.real.dtype)
+    buffer = np.empty((len(orders), _COLUMNS), dtype=parts.dtype)
+    for first in range(0, out.shape[1], _COLUMNS):
+        columns = slice(first, first + _COLUMNS)
+        cells = out[:, columns]
+        both = parts @ monomials([v[columns] for v in values], orders, buffer[:, : cells.shape[1]])
+        cells.real, cells.imag = both[: len(out)], both[len(out) :]

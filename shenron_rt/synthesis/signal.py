@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import ComplexArray, FloatArray, IntArray
 from ..config.profile import RadarProfile
 from ..errors import InputError
 from ..returns import Returns
@@ -58,7 +58,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.amplitude)
 
-    def __getitem__(self, rows: slice) -> Points:
+    def __getitem__(self, rows: slice | IntArray) -> Points:
         return Points(self.amplitude[rows], self.position[rows], self.velocity[rows])
 
 

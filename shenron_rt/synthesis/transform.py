@@ -1,0 +1,231 @@
+"""One block of chirps, one group of echoes: what all element pairs share, and the transform of each."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import ComplexArray, FloatArray, IntArray
+from .blocks import Block
+from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
+from .expansion import LowRank
+from .signal import Points
+
+__all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
+
+#: Shares of the accuracy: the transforms, the expansion, what is neglected.
+TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.3, 0.5, 0.1
+#: Rounding of a single-precision coordinate (RMS of half an ulp), and the finest accuracy single precision reaches.
+SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 1.5e-5
+#: Echoes whose residual phases choose the low-rank form, at each element pair probed.
+SAMPLED_ECHOES = 160
+#: Points worked on at once: their arrays stay in the cache.
+COLUMNS = 8192
+#: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
+PROBE_MARGIN = 1.1
+#: Loosest accuracy a transform is asked for.
+LOOSEST = 0.05
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A group of echoes in one block, ready to be summed for any receiver of one transmitter.
+
+    Parameters
+    ----------
+    accuracy : float
+    block : Block
+    points : MovedPoints
+    to_tx : list of (n,) float
+        Distance to the transmitter and its derivatives.
+    used : tuple of int
+        The residual phases that matter.
+    middle, half : (len(used),) float
+        Centre and half spread of each [rad].
+    form : LowRank
+    waves : (R, n_samples) complex
+        The form at the samples of the block, with the phase of the centres.
+    """
+
+    accuracy: float
+    block: Block
+    points: MovedPoints
+    to_tx: list[FloatArray]
+    used: tuple[int, ...]
+    middle: list[float]
+    half: list[float]
+    form: LowRank
+    waves: ComplexArray
+
+    @classmethod
+    def of(cls, accuracy: float, block: Block, points: Points, tx_m: FloatArray, rx_m: FloatArray) -> Prepared:
+        """Choose the low-rank form from the echoes, seen from the elements that differ most."""
+        moved = MovedPoints.at(points, block.mid_s)
+        to_tx = moved.range_derivatives(tx_m, 4)
+        every = tuple(range(N_RESIDUALS))
+        probes = _probes(rx_m)
+        seen = _residuals(block, moved, to_tx, probes[0], every)
+        rows = _sample_rows(seen)
+        few = MovedPoints.at(points[rows], block.mid_s)
+        few_to_tx = [d[rows] for d in to_tx]
+        sampled = np.concatenate([_residuals(block, few, few_to_tx, rx, every) for rx in probes], axis=1)
+        low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
+        floor = EXPANSION_SHARE / 50 * accuracy
+        used = tuple(i for i in every if max(-low[i], high[i]) > floor)
+        middle = [float(low[i] + high[i]) / 2 for i in used]
+        half = [float(high[i] - low[i]) / 2 * PROBE_MARGIN + floor for i in used]
+        parameters = [(sampled[i] - m) / h for i, m, h in zip(used, middle, half, strict=True)]
+        shapes = [block.shapes[i] for i in used]
+        form = LowRank.fit(half, parameters, [b[block.sample_rows] for b in shapes], EXPANSION_SHARE * accuracy)
+        angle = np.zeros(block.time.size)
+        for m, b in zip(middle, shapes, strict=True):
+            angle += m * b
+        waves = form.waves(shapes, block.time.size) * np.exp(1j * angle)
+        order = 4 if 2 in used else 3 if 1 in used else 2
+        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, waves)
+
+    def transform(self, rx_m: FloatArray) -> ComplexArray:
+        """Sum the echoes at one receiver: (n_chirps, n_samples)."""
+        n, order = len(self.points), len(self.to_tx) - 1
+        fast, slow, constant = np.empty(n), np.empty(n), np.empty(n)
+        coarse = self.accuracy * TRANSFORM_SHARE >= SINGLE_ACCURACY
+        parameters = [np.empty(n, dtype=np.float32 if coarse else np.float64) for _ in self.used]
+        for first in range(0, n, COLUMNS):
+            part = slice(first, first + COLUMNS)
+            back = self.points.part(part).range_derivatives(rx_m, order)
+            phases = Phases.of(self.block, [a[part] + b for a, b in zip(self.to_tx, back, strict=True)], self.used)
+            fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
+            for x, r, m, h in zip(parameters, phases.residuals, self.middle, self.half, strict=True):
+                x[part] = (r - m) / h
+        axes = _Axes.of(self.block, fast, slow)
+        amplitude = _times_phasor(self.points.amplitude, constant, axes.flips, coarse)
+        return self._sum(axes, self.form.strengths(amplitude, parameters)).reshape(self.block.time.shape)
+
+    def _sum(self, axes: _Axes, rows: ComplexArray) -> ComplexArray:
+        """Transform every row no finer than its weight in the result asks for, and add them up."""
+        total = np.zeros(self.block.time.size, dtype=np.complex128)
+        asked = np.minimum(TRANSFORM_SHARE * self.accuracy / self.form.weights, LOOSEST)
+        single = [_single(float(eps), axes) for eps in asked]
+        for first, last in _plans(asked, single):
+            eps = float(asked[first:last].min())
+            sums = _type3(eps, all(single[first:last]), axes, rows[first:last])
+            for value, wave in zip(sums, self.waves[first:last], strict=True):
+                total += value * wave
+        total *= np.exp(1j * (axes.fast_mid * self.block.targets[0] + axes.slow_mid * self.block.targets[1]))
+        return total
+
+
+def _probes(rx_m: FloatArray) -> FloatArray:
+    """Return receivers whose views stand for all: the middle one, then the extremes."""
+    directions = np.array([[0, 1, 0], [0, 0, 1], [0, 1, 1], [0, 1, -1], [1, 0, 0]], dtype=np.float64)
+    along = rx_m @ directions.T
+    middle = int(np.linalg.norm(rx_m - rx_m.mean(axis=0), axis=1).argmin())
+    extremes = np.unique(np.concatenate([along.argmin(axis=0), along.argmax(axis=0)]))
+    return rx_m[[middle, *(i for i in extremes if i != middle)]]
+
+
+def _residuals(
+    block: Block, points: MovedPoints, to_tx: list[FloatArray], rx_m: FloatArray, used: tuple[int, ...]
+) -> FloatArray:
+    """Return the residual phases at one receiver, (len(used), n)."""
+    both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
+    return np.stack(Phases.of(block, both, used).residuals)
+
+
+def _sample_rows(residuals: FloatArray) -> IntArray:
+    """Choose echoes that stand for all: evenly spread rows, and the extremes of every residual and of pair sums."""
+    n = residuals.shape[1]
+    rows = [np.unique(np.linspace(0, n - 1, SAMPLED_ECHOES).astype(int))]
+    if n > SAMPLED_ECHOES:
+        spread = residuals / (np.ptp(residuals, axis=1, keepdims=True) + 1e-300)
+        pairs = itertools.combinations(spread[:2], 2)
+        for x in [*spread, *(a + sign * b for a, b in pairs for sign in (1, -1))]:
+            rows.append(np.array([x.argmin(), x.argmax()]))
+    found: IntArray = np.unique(np.concatenate(rows))
+    return found
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """Sources and targets of the transform, shifted and scaled: targets within [-1, 1], sources in radians.
+
+    A fast frequency is only known modulo the sampling rate; where multiples of it were taken off, ``flips`` holds the
+    phase this changes, half a cycle for an odd multiple and an even number of samples.
+    """
+
+    fast: FloatArray
+    slow: FloatArray
+    targets: tuple[FloatArray, FloatArray]
+    fast_mid: float
+    slow_mid: float
+    flips: FloatArray | None
+    extent: float
+
+    @classmethod
+    def of(cls, block: Block, fast: FloatArray, slow: FloatArray) -> _Axes:
+        """Shift and scale angular frequencies [rad/s], in place."""
+        ends = float(fast.min()), float(fast.max())
+        fast_mid, slow_mid = sum(ends) / 2, (float(slow.min()) + float(slow.max())) / 2
+        fast -= fast_mid
+        rate = TAU * block.sample_rate_hz
+        flips = None
+        if ends[1] - ends[0] > rate:
+            folds = np.rint(fast / rate)
+            fast -= rate * folds
+            flips = folds * (len(block.fast_s) - 1) / 2
+        fast *= block.fast_half_s
+        slow -= slow_mid
+        slow *= block.slow_half_s
+        extent = float(max(fast.max(), -fast.min()) + max(slow.max(), -slow.min()))
+        return cls(fast, slow, block.unit_targets, fast_mid, slow_mid, flips, extent)
+
+
+def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, single: bool) -> ComplexArray:
+    """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
+    turn = cycles if flips is None else cycles + flips
+    turn = turn - np.rint(turn)
+    angle = TAU * turn.astype(np.float32 if single else np.float64)
+    phasor = np.empty(len(angle), dtype=np.complex64 if single else np.complex128)
+    np.cos(angle, out=phasor.real)
+    np.sin(angle, out=phasor.imag)
+    phasor *= amplitude.astype(phasor.dtype, copy=False)
+    return phasor
+
+
+def _single(eps: float, axes: _Axes) -> bool:
+    return eps >= SINGLE_ACCURACY and axes.extent * SINGLE_ULP <= eps
+
+
+def _plans(asked: FloatArray, single: list[bool]) -> list[tuple[int, int]]:
+    """Cut the rows into runs that share a transform, by dynamic programming over measured costs.
+
+    Looser rows want a narrower kernel and single precision, but every transform sorts the points again.
+    """
+    width = np.log10(1 / asked) * 1.2 + 1.5
+    best, back = [0.0], [0]
+    for j in range(1, len(asked) + 1):
+        costs = []
+        for i in range(j):
+            cells, lone = float(width[i:j].max()) ** 2, all(single[i:j])
+            costs.append(best[i] + (35 + (j - i) * (25 + 0.8 * cells) if lone else 60 + (j - i) * (40 + 1.3 * cells)))
+        back.append(int(np.argmin(costs)))
+        best.append(min(costs))
+    runs, j = [], len(asked)
+    while j > 0:
+        runs.append((back[j], j))
+        j = back[j]
+    return runs[::-1]
+
+
+def _type3(eps: float, single: bool, axes: _Axes, rows: ComplexArray) -> ComplexArray:
+    """Sum rows[r, q] exp(j (fast_q s + slow_q T')) at the targets: (n_rows, n_targets)."""
+    import finufft
+
+    real, complex_ = (np.float32, np.complex64) if single else (np.float64, np.complex128)
+    fast, slow, s, t = (x.astype(real, copy=False) for x in (axes.fast, axes.slow, *axes.targets))
+    rows = rows.astype(complex_, copy=False)
+    # groups come sorted by delay and rate already
+    sums = finufft.nufft2d3(fast, slow, rows, s, t, eps=eps, isign=1, nthreads=1, upsampfac=1.25, spread_sort=0)
+    return np.asarray(sums).reshape(len(rows), -1)
