@@ -76,7 +76,7 @@ def physical_returns(scatterers: Scatterers, profile: RadarProfile, materials: M
         part = replace(scatterers.select(rows), speckle=gauss[rows])
         return _echoes(part, index[rows], tables, profile, rows.start)
 
-    blocks = map_blocks(block, len(scatterers)) or [[]]
+    blocks = map_blocks(block, len(scatterers)) or [block(slice(0, 0))]
     return _assemble(
         scatterers, [e for kind in (True, False) for b in blocks for e in b if e.coherent == kind], profile
     )

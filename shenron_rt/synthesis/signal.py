@@ -44,7 +44,7 @@ class Points:
             "velocity": np.asarray(returns.velocity, dtype=np.float64),
         }
         for name, values in columns.items():
-            bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+            bad = np.flatnonzero(~np.isfinite(np.atleast_2d(values.T).T).all(axis=1))
             if len(bad):
                 raise InputError(
                     f"Returns.{name}: {len(bad)} of {len(values)} rows are NaN or infinite, the first is row {bad[0]} "
