@@ -1,6 +1,6 @@
 """Time process and detect on a street of 300 000 echoes: two rough walls, a road, a car; awrl1432, one thread.
 
-    python benchmarks/bench_dsp.py [profile]
+python benchmarks/bench_dsp.py [profile]
 """
 
 from __future__ import annotations
@@ -66,7 +66,9 @@ def main(name: str = "awrl1432") -> None:
     found = detect(cube)
     print(f"{name}: first frame {1e3 * (time.perf_counter() - start):.0f} ms (windows, CFAR multipliers), {found}")
     print(f"process        {best(lambda: process(adc)):7.1f} ms")
-    print(f"detect         {best(lambda: detect(process(adc))) - best(lambda: process(adc)):7.1f} ms, {len(found)} rows")
+    print(
+        f"detect         {best(lambda: detect(process(adc))) - best(lambda: process(adc)):7.1f} ms, {len(found)} rows"
+    )
     bare = process(type(adc)(adc.data, profile, adc.noise_power_w))
     print(f"  without truth {best(lambda: detect(bare)):6.1f} ms")
     print(f"range_azimuth  {best(lambda: process(adc).range_azimuth) - best(lambda: process(adc)):7.1f} ms")

@@ -27,7 +27,7 @@ _ELEVATION_BEAMS = 33
 #: A second target in one range-Doppler cell: weakest power relative to the first, channels it takes to tell two.
 _SECOND_PART, _CHANNELS_FOR_TWO = 10**-1.2, 4
 #: Gauss-Newton steps of a continued fit, and turns between two targets.
-_SHORT, _TURNS = 2, 3
+_SHORT, _TURNS = 2, 2
 
 
 def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> FloatArray:

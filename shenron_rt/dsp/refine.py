@@ -11,7 +11,7 @@ their covariance, so that the weight stays on the main lobe, where a second targ
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -188,12 +188,12 @@ class Elements:
     wavelength_m: float
     range_step_m: float
 
-    @property
+    @cached_property
     def positions(self) -> FloatArray:
         """(n_virtual, 3) tx + rx positions [m]."""
         return np.asarray((self.tx_m[:, None] + self.rx_m[None]).reshape(-1, 3))
 
-    @property
+    @cached_property
     def free(self) -> tuple[bool, bool]:
         """Whether the array has an aperture in azimuth and in elevation."""
         spans = np.ptp(self.positions, axis=0)
@@ -205,14 +205,14 @@ class Elements:
         |p - a| - |p| = (a.a - 2 p.a) / (|p - a| + |p|) element by element: exact, without a difference of ranges.
         """
         forward = np.sqrt(np.maximum(1 - sine**2 - elevation**2, 0.0))
-        target = np.maximum(distance, 1e-3)[:, None] * np.stack([forward, sine, elevation], axis=1)
+        away = np.maximum(distance, 1e-3)[:, None]
+        target = away * np.stack([forward, sine, elevation], axis=1)
         legs = []
         for element in (self.tx_m, self.rx_m):
-            to_element = np.linalg.norm(target[:, None] - element, axis=2)
-            excess = np.sum(element**2, axis=1) - 2 * target @ element.T
-            legs.append(excess / (to_element + np.linalg.norm(target, axis=1)[:, None]))
+            excess = np.sum(element**2, axis=1) - 2 * target @ element.T  # |p - a|^2 - |p|^2
+            legs.append(excess / (np.sqrt(np.maximum(away**2 + excess, 0.0)) + away))
         pairs = len(self.tx_m) * len(self.rx_m)  # -1 could not be told where there is no peak at all
-        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), pairs)
+        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), len(self.tx_m) * len(self.rx_m))
         phasor = np.exp(2j * np.pi / self.wavelength_m * path)
         return np.asarray(phasor, dtype=np.complex128), path / (2 * self.range_step_m)
 
@@ -313,8 +313,10 @@ def fit_peaks(
     s, e = sine.copy(), sine_elevation.copy()
     middle = elements.phasor(base_m, s, e)[1].mean(axis=1)
     f, d = (-middle, np.zeros(len(s))) if start is None else start
+    amplitude = np.zeros(len(s), dtype=np.complex128)
     for _ in range(iterations):
-        step, _ = _step(patch, elements, base_m, f, d, s, e)
+        # the amplitude is that before the step: a step delta from the maximum changes it by O(delta^2) only
+        step, amplitude = _step(patch, elements, base_m, f, d, s, e)
         step = np.clip(step, -np.asarray(limits), np.asarray(limits))
         # f refers to the origin of the array, the peak to its middle: the limit is about the peak
         f = np.clip(f + step[:, 0], -bound[0] - middle, bound[0] - middle)
@@ -324,7 +326,6 @@ def fit_peaks(
         if elements.free[1]:
             top = np.sqrt(1 - s**2)
             e = np.clip(e + step[:, -1], -top, top)
-    _, amplitude = _step(patch, elements, base_m, f, d, s, e)
     phasor, _ = elements.phasor(base_m + f * elements.range_step_m, s, e)
     return PeakFit(f, d, s, e, amplitude, phasor)
 

@@ -120,12 +120,14 @@ def _gather(cube: RadarCube, returns: Returns, row: IntArray, column: IntArray) 
     cell = number[i, j]
     close = np.flatnonzero(cell >= 0)
     cosines = returns.position[close, 1:] / distance[close, None]
-    steps = max(64, len(cube.azimuth_sine)), _ELEVATION_STEPS if angle.has_elevation(p.positions_m, p.wavelength_m) else 1
+    steps = (
+        max(64, len(cube.azimuth_sine)),
+        _ELEVATION_STEPS if angle.has_elevation(p.positions_m, p.wavelength_m) else 1,
+    )
     beams = [np.minimum(((cosines[:, k] + 1) / 2 * n).astype(np.int64), n - 1) for k, n in enumerate(steps)]
-    label = returns.object_id[close].astype(np.int64) * 256 + returns.tag[close]
-    labels = np.unique(label)
-    which = np.searchsorted(labels, label)
-    sizes = [int(number.max()) + 1, len(labels), *steps]
+    ids, tags = returns.object_id[close].astype(np.int64), returns.tag[close].astype(np.int64)
+    which, labels = _compact([ids, tags], [int(ids.max(initial=0)) + 1, 256])
+    sizes = [int(number.max()) + 1, labels, *steps]
     cluster, count = _compact([cell[close], which, *beams], sizes)
     amplitude, coherent = returns.amplitude[close], returns.coherent[close]
     power = amplitude.real**2 + amplitude.imag**2
@@ -139,8 +141,8 @@ def _gather(cube: RadarCube, returns: Returns, row: IntArray, column: IntArray) 
         object_id=returns.object_id[some].astype(np.int64),
         tag=returns.tag[some],
         phasor=_phasor_sum(cube, returns, close[coherent], distance, cluster[coherent], count),
-        speckle=np.bincount(cluster, np.where(coherent, 0.0, power), count),
-        power=total,
+        speckle=np.bincount(cluster, np.where(coherent, 0.0, power), count).astype(np.float64),
+        power=total.astype(np.float64),
         velocity=np.bincount(cluster, power * radial[close], count) / np.maximum(total, 1e-300),
     )
 
