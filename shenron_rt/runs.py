@@ -221,7 +221,7 @@ def objects_summary(
         records.append(
             {
                 "id": number,
-                "name": (names or {}).get(number, f"object {number}"),
+                "name": (names or {}).get(number, f"object {number}" if number else "static"),
                 "tag": SemanticTag(tags[number]).name if number in tags else None,
                 "power_dbw": level,
                 "snr_db": None if level is None else level - 10 * math.log10(noise),

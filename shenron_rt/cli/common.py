@@ -33,8 +33,8 @@ ProfileNames: TypeAlias = Annotated[
 ]
 SetOptions: TypeAlias = Annotated[
     list[str] | None,
-    Parameter(name="--set", negative=(), help="KEY=VALUE, KEY as profile.x.y, scene.x.y or processing.x. May be repeated."),
-]  # fmt: skip
+    Parameter(name="--set", negative=(), help="KEY=VALUE, KEY as profile.x.y, scene.x.y, processing.x. Repeatable."),
+]
 Json: TypeAlias = Annotated[
     bool, Parameter(name="--json", negative=(), help="Print JSON on stdout and nothing else there.")
 ]

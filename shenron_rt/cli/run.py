@@ -214,8 +214,9 @@ def _write_config(path: Path, scene: Scene) -> None:
     """Write the scene with its profiles inside and its files by absolute path, so that it runs from anywhere."""
     import yaml
 
-    data = scene.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-    data = {"version": scene.version, "name": scene.name, "seed": scene.seed} | data
+    data: dict[str, Any] = scene.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    always = scene.model_dump(mode="json", include={"version", "name", "seed", "frame_period_s", "weather"})
+    data = always | data
     data["radars"] = [
         r.model_dump(mode="json", exclude_none=True)
         | {"profile": scene.profile_of(r).model_dump(mode="json", exclude_none=True)}

@@ -38,7 +38,8 @@ def profiles(name: str | None = None, /, *, set_: SetOptions = None, json_: Json
     rows = [
         (
             p.name, f"{p.waveform.carrier_hz / 1e9:g}", f"{p.waveform.bandwidth_hz / 1e6:g}",
-            f"{p.range_resolution_m:.2f}", f"{p.max_range_m:.0f}", f"{p.max_velocity_mps:.2f}", f"{p.n_virtual}", p.array.multiplex,
+            f"{p.range_resolution_m:.2f}", f"{p.max_range_m:.0f}", f"{p.max_velocity_mps:.2f}",
+            f"{p.n_virtual}", p.array.multiplex,
         )
         for p in found
     ]  # fmt: skip
@@ -109,12 +110,15 @@ def materials(
     if name is not None:
         _one_material(name, loaded[name], frequency_ghz, json_)
         return 0
-    rows = []
-    for key, material in loaded.materials.items():
-        eps = _permittivity(material, frequency_ghz)
-        rows.append(
-            (key, eps, f"{material.roughness_rms_m * 1e3:g}", f"{len(material.unconfirmed)} of {len(material.sources)}")
+    rows = [
+        (
+            key,
+            _permittivity(m, frequency_ghz),
+            f"{m.roughness_rms_m * 1e3:g}",
+            f"{len(m.unconfirmed)} of {len(m.sources)}",
         )
+        for key, m in loaded.materials.items()
+    ]
     if json_:
         made_of = {t: dict(entries) for t, entries in loaded.tags.items()}
         print_json({"materials": [r[0] for r in rows], "tags": made_of, "unconfirmed": loaded.unconfirmed})
@@ -140,5 +144,9 @@ def _one_material(name: str, material: Any, frequency_ghz: float, as_json: bool)
         print_json({"name": name, "given": given, "sources": dict(material.sources)})
         return
     say(f"{name}: permittivity {_permittivity(material, frequency_ghz)} at {frequency_ghz:g} GHz")
-    rows = [(key, _shown(value), _source(material.sources, key)) for key, value in _leaves(given)]
+    # the values of a P.2040 entry stand in the recommendation itself
+    sources = ({"permittivity": "ITU-R P.2040-3, Table 3"} if material.permittivity.model == "p2040" else {}) | dict(
+        material.sources
+    )
+    rows = [(key, _shown(value), _source(sources, key)) for key, value in _leaves(given)]
     show_table("Given", ("key", "value", "source"), rows)
