@@ -212,7 +212,7 @@ class Elements:
             excess = np.sum(element**2, axis=1) - 2 * target @ element.T  # |p - a|^2 - |p|^2
             legs.append(excess / (np.sqrt(np.maximum(away**2 + excess, 0.0)) + away))
         pairs = len(self.tx_m) * len(self.rx_m)  # -1 could not be told where there is no peak at all
-        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), len(self.tx_m) * len(self.rx_m))
+        path = (legs[0][:, :, None] + legs[1][:, None, :]).reshape(len(target), pairs)
         phasor = np.exp(2j * np.pi / self.wavelength_m * path)
         return np.asarray(phasor, dtype=np.complex128), path / (2 * self.range_step_m)
 

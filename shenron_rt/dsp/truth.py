@@ -96,7 +96,7 @@ def _near(cube: RadarCube, row: IntArray, column: IntArray) -> IntArray:
 
 
 def _compact(keys: list[IntArray], sizes: list[int]) -> tuple[IntArray, int]:
-    """Number the combinations of keys that occur; return the number of every row and how many there are."""
+    """Return a running number of each row's combination of keys, and how many combinations occur."""
     total = int(np.prod([float(s) for s in sizes]))
     packed = np.zeros(len(keys[0]), dtype=np.int64)
     for key, size in zip(keys, sizes, strict=True):
