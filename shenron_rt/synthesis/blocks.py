@@ -19,8 +19,9 @@ from .signal import Clock, Points
 
 __all__ = ["Block", "Group", "cut", "group_points"]
 
-#: Cost of a transform in nanoseconds: per point whatever the rank, per point and term, per term, per transform.
-COST_POINT, COST_SPREAD, COST_GRID, COST_SETUP = 100.0, 110.0, 1.5e6, 1.0e6
+#: Costs in nanoseconds, of one core, to choose by: of a transform per point and per point and term; per transform; per
+#: term and cell of its grid, and per term and sample; of the exact sum per point and sample.
+COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 100.0, 110.0, 1.5e6, 12.0, 80.0, 70.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
 
@@ -153,13 +154,16 @@ def group_points(
     todo = np.arange(len(points))
     bound = _Bounds.of(clock, points, chirp_start_s, array_radius_m)
     groups: list[Group] = []
+    samples = len(chirp_start_s) * len(clock.sample_s)
     count = 1
     while len(todo) and count <= len(chirp_start_s):
         half = max(block.half_s for block in cut(clock, chirp_start_s, count))
         curvature, neglected = bound.phases(clock, todo, half)
         fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
-        for rows in _by_curvature(curvature[fits], 4 * tolerance):
-            groups.append(Group(count, todo[fits][rows]))
+        term = COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
+        for rows, cost in _by_curvature(curvature[fits], 4 * tolerance, term):
+            exact = COST_EXACT * samples * len(rows)
+            groups.append(Group(count if count * cost < exact else 0, todo[fits][rows]))
         todo = todo[~fits]
         count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
     if len(todo):
@@ -224,6 +228,15 @@ class _Bounds:
         curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
         return cls(curvature, speed, np.maximum(least, 1e-9), farthest)
 
+    def cells(self, clock: Clock, rows: IntArray, half: float) -> float:
+        """Estimate the cells of the grid of a transform from the spread of delay and rate."""
+        if not len(rows):
+            return 0.0
+        delay = 4 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(self.farthest[rows]))
+        fast = min(delay * float(np.ptp(clock.sample_s)) / 2, len(clock.sample_s))
+        slow = 8 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
+        return 1.25**4 * (fast + 10) * (slow + 10)
+
     def phases(self, clock: Clock, rows: IntArray, half: float) -> tuple[FloatArray, FloatArray]:
         """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
         curvature = np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * self.curvature[rows] * half**2
@@ -239,10 +252,11 @@ class _Bounds:
         return curvature, series + cross + late
 
 
-def _by_curvature(phase: FloatArray, tolerance: float) -> list[IntArray]:
+def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list[tuple[IntArray, float]]:
     """Cut curvature phases into groups of small spread where that saves transforms.
 
-    Dynamic programming over fixed edges with the measured costs above; ``tolerance`` is that of the expansion.
+    Dynamic programming over fixed edges with the costs above; ``tolerance`` is that of the expansion, ``term_cost``
+    that of one term without its points. Returns rows, and cost, of every group.
     """
     if not len(phase):
         return []
@@ -259,11 +273,12 @@ def _by_curvature(phase: FloatArray, tolerance: float) -> list[IntArray]:
             top = edges[min(at[j] - 1, len(edges) - 1)]
             terms = rank((top - lower[at[i]]) / 2, tolerance)
             size = int(before[at[j]] - before[at[i]])
-            costs.append(best[i] + COST_SETUP + COST_GRID * terms + size * (COST_POINT + COST_SPREAD * terms))
+            costs.append(best[i] + COST_SETUP + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
         back.append(int(np.argmin(costs)))
         best.append(min(costs))
     groups, j = [], len(at) - 1
     while j > 0:
-        groups.append(np.flatnonzero((cell >= at[back[j]]) & (cell < at[j])))
+        rows = np.flatnonzero((cell >= at[back[j]]) & (cell < at[j]))
+        groups.append((rows, best[j] - best[back[j]]))
         j = back[j]
     return groups[::-1]

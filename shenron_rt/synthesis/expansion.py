@@ -1,8 +1,8 @@
 """Low-rank form of exp(j psi) for small residual phases: few transforms with shared points instead of one exact sum.
 
-A residual phase psi(q, g) = sum_i a_i x_i(q) b_i(g) separates into parameters x of an echo q and shapes b of a sample g,
-both within [-1, 1]. The exponential series gives exp(j psi) as a sum of monomials in x times monomials in b; a singular
-value decomposition over the echoes that are there then finds the few combinations of both that matter.
+A residual phase psi(q, g) = sum_i a_i x_i(q) b_i(g) separates into parameters x of an echo q and shapes b of a
+sample g, both within [-1, 1]. The exponential series gives exp(j psi) as a sum of monomials in x times monomials in b;
+a singular value decomposition over the echoes that are there then finds the few combinations of both that matter.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Orders = tuple[int, ...]
 
 
 def rank(amplitude: float, tolerance: float) -> int:
-    """Number of terms that one factor exp(j A x b) needs: abs(J_p(A)) <= (A/2)^p / p! (Abramowitz and Stegun 9.1.62)."""
+    """Return how many terms exp(j A x b) needs: abs(J_p(A)) <= (A/2)^p / p! (Abramowitz and Stegun 9.1.62)."""
     for p in range(1, _ORDER_LIMIT):
         if 2 * (amplitude / 2) ** p / math.factorial(p) <= tolerance:
             return p

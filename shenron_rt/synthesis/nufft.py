@@ -87,13 +87,16 @@ def _jobs(
         part = points[group.rows]
         if group.blocks == 0:
             for j in range(len(rx_m)):
-                exact = partial(direct_field, clock, part, tx_m, rx_m[j : j + 1], chirp_start_s)
-                yield (slice(None), j), lambda exact=exact: exact()[:, 0]
+                yield (slice(None), j), partial(_exact, clock, part, tx_m, rx_m[j], chirp_start_s)
             continue
         for block in cuts[group.blocks]:
             ready = Prepared.of(accuracy, block, part, tx_m, rx_m)
             for j, rx in enumerate(rx_m):
                 yield (block.chirps, j), partial(ready.transform, rx)
+
+
+def _exact(clock: Clock, points: Points, tx_m: FloatArray, rx_m: FloatArray, chirp_start_s: FloatArray) -> ComplexArray:
+    return direct_field(clock, points, tx_m, rx_m[None], chirp_start_s)[:, 0]
 
 
 def _in_order(jobs: Iterable[Job], workers: int) -> Iterator[tuple[tuple[slice, int], ComplexArray]]:

@@ -28,7 +28,8 @@ def to_adc(profile: RadarProfile, raw: ComplexArray) -> ComplexArray:
     """Return sqrt(2) Re(x) for a real ADC, which keeps the power of a tone, x itself for a complex one."""
     if profile.waveform.adc == "complex":
         return raw
-    return (np.sqrt(2.0) * raw.real).astype(np.complex128)
+    real: ComplexArray = (np.sqrt(2.0) * raw.real).astype(np.complex128)
+    return real
 
 
 def add_noise(profile: RadarProfile, raw: ComplexArray, generator: np.random.Generator) -> None:
@@ -66,4 +67,5 @@ def quantise(profile: RadarProfile, raw: ComplexArray) -> ComplexArray:
             "ADC saturation: %d of %d samples (%.3g %%) beyond full scale %g dBm of profile %r",
             count, raw.size, 100 * count / raw.size, level, profile.name,
         )  # fmt: skip
-    return (np.clip(codes, -half, half - 1) * step).view(np.complex128)
+    rounded: ComplexArray = (np.clip(codes, -half, half - 1) * step).view(np.complex128)
+    return rounded

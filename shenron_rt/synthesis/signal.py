@@ -38,22 +38,19 @@ class Points:
         InputError
             A value is NaN or infinite.
         """
-        columns = {
-            "amplitude": np.asarray(returns.amplitude, dtype=np.complex128),
-            "position": np.asarray(returns.position, dtype=np.float64),
-            "velocity": np.asarray(returns.velocity, dtype=np.float64),
-        }
-        for name, values in columns.items():
+        amplitude = np.asarray(returns.amplitude, dtype=np.complex128)
+        position = np.asarray(returns.position, dtype=np.float64)
+        velocity = np.asarray(returns.velocity, dtype=np.float64)
+        for name, values in (("amplitude", amplitude), ("position", position), ("velocity", velocity)):
             bad = np.flatnonzero(~np.isfinite(np.atleast_2d(values.T).T).all(axis=1))
             if len(bad):
                 raise InputError(
                     f"Returns.{name}: {len(bad)} of {len(values)} rows are NaN or infinite, the first is row {bad[0]} "
                     f"({values[bad[0]]}); finite numbers are needed"
                 )
-        heard = columns["amplitude"] != 0
-        if not heard.all():
-            columns = {name: values[heard] for name, values in columns.items()}
-        return cls(**columns)
+        points = cls(amplitude, position, velocity)
+        heard = np.flatnonzero(amplitude)
+        return points if len(heard) == len(amplitude) else points[heard]
 
     def __len__(self) -> int:
         return len(self.amplitude)

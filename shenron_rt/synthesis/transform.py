@@ -6,6 +6,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from .._typing import ComplexArray, FloatArray, IntArray
 from .blocks import Block
@@ -18,13 +19,15 @@ __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 #: Shares of the accuracy: the transforms, the expansion, what is neglected.
 TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.3, 0.5, 0.1
 #: Rounding of a single-precision coordinate (RMS of half an ulp), and the finest accuracy single precision reaches.
-SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 1.5e-5
+SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 2.5e-5
 #: Echoes whose residual phases choose the low-rank form, at each element pair probed.
 SAMPLED_ECHOES = 160
 #: Points worked on at once: their arrays stay in the cache.
 COLUMNS = 8192
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
+#: Oversampling of the transform's grid: the smallest, for a type-3 grid is oversampled twice.
+UPSAMPLING = 1.25
 #: Loosest accuracy a transform is asked for.
 LOOSEST = 0.05
 
@@ -91,7 +94,8 @@ class Prepared:
         n, order = len(self.points), len(self.to_tx) - 1
         fast, slow, constant = np.empty(n), np.empty(n), np.empty(n)
         coarse = self.accuracy * TRANSFORM_SHARE >= SINGLE_ACCURACY
-        parameters = [np.empty(n, dtype=np.float32 if coarse else np.float64) for _ in self.used]
+        dtype: DTypeLike = np.float32 if coarse else np.float64
+        parameters: list[FloatArray] = [np.empty(n, dtype=dtype) for _ in self.used]
         for first in range(0, n, COLUMNS):
             part = slice(first, first + COLUMNS)
             back = self.points.part(part).range_derivatives(rx_m, order)
@@ -186,11 +190,12 @@ def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray
     """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
     turn = cycles if flips is None else cycles + flips
     turn = turn - np.rint(turn)
-    angle = TAU * turn.astype(np.float32 if single else np.float64)
-    phasor = np.empty(len(angle), dtype=np.complex64 if single else np.complex128)
+    dtype: DTypeLike = np.complex64 if single else np.complex128
+    phasor: ComplexArray = np.empty(len(turn), dtype=dtype)
+    angle = TAU * turn.astype(phasor.real.dtype)
     np.cos(angle, out=phasor.real)
     np.sin(angle, out=phasor.imag)
-    phasor *= amplitude.astype(phasor.dtype, copy=False)
+    phasor *= amplitude.astype(dtype, copy=False)
     return phasor
 
 
@@ -227,5 +232,6 @@ def _type3(eps: float, single: bool, axes: _Axes, rows: ComplexArray) -> Complex
     fast, slow, s, t = (x.astype(real, copy=False) for x in (axes.fast, axes.slow, *axes.targets))
     rows = rows.astype(complex_, copy=False)
     # groups come sorted by delay and rate already
-    sums = finufft.nufft2d3(fast, slow, rows, s, t, eps=eps, isign=1, nthreads=1, upsampfac=1.25, spread_sort=0)
+    options = {"isign": 1, "nthreads": 1, "upsampfac": UPSAMPLING, "spread_sort": 0, "showwarn": 0}
+    sums = finufft.nufft2d3(fast, slow, rows, s, t, eps=eps, **options)
     return np.asarray(sums).reshape(len(rows), -1)
