@@ -94,7 +94,7 @@ def test_json_is_the_summary_and_nothing_else(capsys: pytest.CaptureFixture[str]
 def test_default_folders_are_numbered_and_overwrite_needs_to_be_said(capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):
         assert main(["run", "street.yaml", *FAST]) == 0
-    assert sorted(os.listdir("out")) == ["street-awrl1432", "street-awrl1432-2"]
+    assert sorted(p.name for p in Path("out").iterdir()) == ["street-awrl1432", "street-awrl1432-2"]
     capsys.readouterr()
     before = _hash(Path("out/street-awrl1432/manifest.json"))
     assert main(["run", "street.yaml", *FAST, "--seed", "6", "-o", "out/street-awrl1432"]) == 2
@@ -102,7 +102,7 @@ def test_default_folders_are_numbered_and_overwrite_needs_to_be_said(capsys: pyt
     assert _hash(Path("out/street-awrl1432/manifest.json")) == before
     summary = _run("--seed", "6", "-o", "out/street-awrl1432", "--overwrite")
     assert summary["seed"] == 6
-    assert sorted(os.listdir("out")) == ["street-awrl1432", "street-awrl1432-2"]
+    assert sorted(p.name for p in Path("out").iterdir()) == ["street-awrl1432", "street-awrl1432-2"]
 
 
 def test_the_written_config_runs_again_to_the_same_bytes() -> None:
@@ -174,7 +174,7 @@ def test_a_crash_in_the_middle_leaves_the_old_run_intact(
     monkeypatch.setattr("shenron_rt.runs.frame_summary", broken)
     assert main(["run", "street.yaml", *FAST, "-o", "a", "--overwrite"]) == 1
     assert {p: _hash(p) for p in sorted(Path("a").rglob("*")) if p.is_file()} == before
-    assert sorted(os.listdir()) == ["a", "street.yaml"]
+    assert sorted(p.name for p in Path().iterdir()) == ["a", "street.yaml"]
     assert "planted" in capsys.readouterr().err
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +26,12 @@ def _tree(folder: Path) -> dict[str, bytes]:
 def _write(folder: Path, text: str, *, overwrite: bool = False) -> None:
     with runs.write_run(folder, overwrite=overwrite) as partial:
         runs.write_json(partial / "summary.json", {"version": "1", "radars": [], "text": text})
+
+
+def _crash(folder: Path, error: type[BaseException]) -> None:
+    with runs.write_run(folder, overwrite=True) as partial:
+        (partial / "summary.json").write_text("half")
+        raise error
 
 
 def test_a_frame_is_written_under_the_names_of_its_attributes(tmp_path: Path) -> None:
@@ -124,7 +129,7 @@ def test_a_folder_with_content_is_refused_and_left_alone(tmp_path: Path) -> None
     assert _tree(folder) == before
     _write(folder, "new", overwrite=True)
     assert json.loads((folder / "summary.json").read_text())["text"] == "new"
-    assert os.listdir(tmp_path) == ["run"], "no temporary folder stays behind"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"], "no temporary folder stays behind"
 
 
 def test_overwrite_never_replaces_what_is_no_run(tmp_path: Path) -> None:
@@ -148,14 +153,13 @@ def test_a_crash_in_the_middle_leaves_the_old_run_intact(error: type[BaseExcepti
     folder = tmp_path / "run"
     _write(folder, "old")
     before = _tree(folder)
-    with pytest.raises(error), runs.write_run(folder, overwrite=True) as partial:
-        (partial / "summary.json").write_text("half")
-        raise error
+    with pytest.raises(error):
+        _crash(folder, error)
     assert _tree(folder) == before
-    assert os.listdir(tmp_path) == ["run"]
-    with pytest.raises(error), runs.write_run(tmp_path / "new"):
-        raise error
-    assert os.listdir(tmp_path) == ["run"]
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+    with pytest.raises(error):
+        _crash(tmp_path / "new", error)
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
 def test_a_failed_move_puts_the_old_run_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

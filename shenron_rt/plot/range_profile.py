@@ -48,7 +48,7 @@ def range_profile(
     matplotlib.figure.Figure
     """
     figure, axes = new_figure(9.0, 4.6)
-    axes.set_position((0.08, 0.12, 0.90, 0.72))
+    axes.set_position((0.08, 0.19, 0.90, 0.65))
     rows = np.arange(len(cube.range_m))
     best = cube.range_doppler.argmax(axis=1)
     level = dbm(cube.range_doppler[rows, best])
@@ -72,7 +72,7 @@ def range_profile(
     axes.set_xlabel("range [m]")
     axes.set_ylabel("power, mean of channels [dBm]")
     axes.grid(color=GRID, lw=0.6)
-    axes.legend(fontsize=8, loc="upper right", framealpha=0.9)
+    axes.legend(fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4, frameon=False)
     figure.text(0.08, 0.955, title or "Range profile", fontsize=11, weight="bold", va="center")
     return figure
 
