@@ -124,7 +124,7 @@ def test_surface_scatter_of_a_coated_material_uses_the_coated_reflectivity() -> 
 
 def test_roughness_of_a_material_reduces_its_coherent_part() -> None:
     k = 2 * np.pi * 77e9 / 299_792_458.0
-    assert TABLE["concrete"].coherent_factor(77e9, 1.0) == pytest.approx(float(coherent_factor(k, 0.0003, 1.0)))
+    assert TABLE["concrete"].coherent_factor(77e9, 1.0) == pytest.approx(float(coherent_factor(k, 0.00012, 1.0)))
 
 
 def test_skin_is_gabriel_s_dry_skin() -> None:
