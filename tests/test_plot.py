@@ -115,6 +115,18 @@ def test_birds_eye_has_forward_up_and_left_on_the_left(frame: Any) -> None:
     np.testing.assert_allclose(_rings(figure), wanted, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", ["awrl1432", "ti_cascade", "awrl1432boost"])
+def test_birds_eye_shows_the_noise_floor_dark_but_not_black(name: str) -> None:
+    frame = hand_made_frame(name)
+    image = birds_eye(frame.cube).axes[0].get_images()[0]
+    low, high = image.get_clim()
+    floor = float(np.nanmedian(np.asarray(image.get_array(), dtype=np.float64)))
+    # 86 channels beamform noise down by 19 dB: the floor follows, or stays outside the 50 dB shown
+    assert high - low <= SPAN_DB
+    assert high - floor > 10
+    assert low == pytest.approx(high - SPAN_DB) or 1 <= floor - low <= 6
+
+
 def test_top_view_paints_scatterers_over_grey_edges(frame: Any) -> None:
     figure = top_view(frame.scatterers, frame.returns, frame.detections, mesh=(BOX_VERTICES, BOX_FACES))
     axes = figure.axes[0]

@@ -41,7 +41,7 @@ Json: TypeAlias = Annotated[
 
 _PREFIXES = ("profile", "scene", "processing")
 #: Columns of a table that goes to a file or a pipe.
-_PIPE_WIDTH = 120
+_PIPE_WIDTH = 200
 
 
 class Overrides:

@@ -47,7 +47,7 @@ def birds_eye(
     height = min(6.8 * reach / (2 * side), 6.5) + 1.3
     figure, axes = new_figure(8.6, height)
     axes.set_position((0.08, 0.6 / height, 0.79, 1 - 1.3 / height))
-    low, high = limits(level, float(dbm(cube.noise_power_w)))
+    low, high = limits(level, _noise_dbm(cube))
     half = reach / _PIXELS
     image = axes.imshow(
         _fan(level, sine, cube.range_step_m, reach, side), origin="lower", interpolation="nearest", cmap=CMAP,
@@ -74,6 +74,12 @@ def birds_eye(
     bar.ax.tick_params(labelsize=8)
     figure.text(0.08, 1 - 0.25 / height, title or "Range-azimuth", fontsize=11, weight="bold", va="center")
     return figure
+
+
+def _noise_dbm(cube: RadarCube) -> float:
+    """Return what noise reads in the map: the largest of n_velocity exponential cells, mean about ln n_velocity."""
+    largest = max(1.0, float(np.log(cube.data.shape[1])))
+    return float(dbm(cube.noise_power_w / len(cube.azimuth_channels) * largest))
 
 
 def _closed(level: FloatArray, sine: FloatArray) -> tuple[FloatArray, FloatArray]:
