@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "shenron_rt"
 #: Bottom to top. A module may import its own layer and those above it in this list; the longest name that fits counts.
 LAYERS = (
     ("errors", "constants", "_typing"),
-    ("frames", "randomness", "resources", "io.npz", "config._base", "config.loader"),
+    ("frames", "randomness", "resources", "_parallel", "io.npz", "config._base", "config.loader"),
     ("physics", "tags"),
     ("scatterers", "scene.mesh", "scene.mesh_frames"),  # plain values that the scene's models hold
     ("config",),
