@@ -40,15 +40,27 @@ def _cosine_sum(coefficients: tuple[float, ...]) -> Callable[[int], FloatArray]:
 
 
 def _taylor(n: int) -> FloatArray:
-    from scipy.signal.windows import taylor
-
-    return np.asarray(taylor(n, nbar=TAYLOR_NBAR, sll=TAYLOR_SLL_DB, norm=True, sym=True), dtype=np.float64)
+    """Symmetric Taylor taper, peak 1: T. T. Taylor, IRE Trans. AP-3, 16-28 (1955), doi:10.1109/TPGAP.1955.5720407."""
+    a2 = (np.arccosh(10 ** (TAYLOR_SLL_DB / 20)) / np.pi) ** 2
+    stretch = TAYLOR_NBAR**2 / (a2 + (TAYLOR_NBAR - 0.5) ** 2)
+    order = np.arange(1, TAYLOR_NBAR)
+    m = order[:, None]
+    zeros = np.prod(1 - m**2 / (stretch * (a2 + (order - 0.5) ** 2)), axis=1)
+    others = np.prod(np.where(m == order, 1.0, 1 - (m / order) ** 2), axis=1)
+    weight = (-1.0) ** (order + 1) * zeros / others
+    taper = 1 + weight @ np.cos(2 * np.pi * m * (np.arange(n) - (n - 1) / 2) / n)
+    return np.asarray(taper / (1 + weight.sum()), dtype=np.float64)
 
 
 def _chebyshev(n: int) -> FloatArray:
-    from scipy.signal.windows import chebwin
-
-    return np.asarray(chebwin(n, at=CHEBYSHEV_SLL_DB, sym=True), dtype=np.float64)
+    """Symmetric Dolph-Chebyshev taper, peak 1: C. L. Dolph, Proc. IRE 34, 335-348 (1946)."""
+    order = n - 1
+    x = np.cosh(np.arccosh(10 ** (CHEBYSHEV_SLL_DB / 20)) / order) * np.cos(np.pi * np.arange(n) / n)
+    inside = np.cos(order * np.arccos(np.clip(x, -1, 1)))
+    outside = np.sign(x) ** order * np.cosh(order * np.arccosh(np.maximum(np.abs(x), 1)))
+    spectrum = np.where(np.abs(x) <= 1, inside, outside)
+    taper = np.cos(2 * np.pi / n * np.outer(np.arange(n) - order / 2, np.arange(n))) @ spectrum
+    return np.asarray(taper / taper.max(), dtype=np.float64)
 
 
 _PERIODIC = {name: _cosine_sum(a) for name, a in _COSINE_SUMS.items()}
