@@ -14,6 +14,7 @@ from ..config.profile import RadarProfile
 from ..errors import InputError
 from ..io.npz import load_npz, save_npz
 from ..returns import Returns
+from ..scatterers import Weather
 
 __all__ = ["AdcCube"]
 
@@ -32,6 +33,8 @@ class AdcCube:
         Thermal noise per sample that was added [W]; 0 where none was.
     seed, frame : int
         What the noise derives from.
+    weather : Weather or None
+        Whose attenuation the samples have, for the RCS of detections.
     returns : Returns or None
         The echoes behind it, for truth attribution; not saved with the cube.
     """
@@ -43,6 +46,7 @@ class AdcCube:
     noise_power_w: float = 0.0
     seed: int = 0
     frame: int = 0
+    weather: Weather | None = None
     returns: Returns | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,6 +82,7 @@ class AdcCube:
             "noise_power_w": self.noise_power_w,
             "seed": self.seed,
             "frame": self.frame,
+            "weather": None if self.weather is None else self.weather.to_array(),
         }
         save_npz(path, arrays)
 
@@ -97,4 +102,5 @@ class AdcCube:
             noise_power_w=float(arrays.get("noise_power_w", 0.0)),
             seed=int(arrays.get("seed", 0)),
             frame=int(arrays.get("frame", 0)),
+            weather=Weather.from_array(arrays["weather"]) if "weather" in arrays else None,
         )

@@ -22,7 +22,7 @@ __all__ = ["synthesize"]
 ACCURACY_MIN, ACCURACY_MAX = 1e-9, 1e-1
 #: Finest accuracy double precision allows at 1e5 cycles of carrier phase.
 ACCURACY_LIMIT = 1e-11
-#: Cube RMS over the root sum of powers below which the margin of the NUFFT (measured error <= 0.6 of the accuracy asked)
+#: Cube RMS over the root sum of powers below which the margin of the NUFFT (measured error <= 0.6 of what was asked)
 #: is used up.
 CANCELLATION = 0.6
 
