@@ -43,5 +43,5 @@ class LoopCode:
     def decode_anew(self, channels: ComplexArray, bins: FloatArray) -> ComplexArray:
         """Decode (..., n_virtual) channels for a Doppler ``bins`` (...) farther than the one they are decoded for."""
         n_tx = self.signs.shape[1]
-        by_tx = channels.reshape(*channels.shape[:-1], n_tx, -1)
+        by_tx = channels.reshape(*channels.shape[:-1], n_tx, channels.shape[-1] // n_tx)  # -1 fails on no peaks
         return np.asarray(np.matmul(self.matrices(bins), by_tx).reshape(channels.shape), dtype=np.complex128)
