@@ -12,11 +12,11 @@ from ._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from .constants import SPEED_OF_LIGHT
 from .errors import InputError
 from .io.npz import load_npz, save_npz
+from .scatterers import Scatterers, Weather
 
 if TYPE_CHECKING:
     from .config.materials import MaterialTable
     from .config.profile import RadarProfile
-    from .scatterers import Scatterers
 
 __all__ = ["Returns", "illuminate"]
 
@@ -46,6 +46,8 @@ class Returns:
         f_c of the profile, for the phase sum of :meth:`power_by_object` [Hz].
     model : str
         The echo model.
+    weather : Weather or None
+        Whose attenuation the amplitudes have; ``None`` is none.
     """
 
     amplitude: ComplexArray
@@ -58,6 +60,7 @@ class Returns:
     scatterer: IntArray
     center_hz: float
     model: str = "physical"
+    weather: Weather | None = None
 
     def __post_init__(self) -> None:
         n = len(self.amplitude)
@@ -98,6 +101,7 @@ class Returns:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save every field, and ``delay_s``, to an ``.npz`` file."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        arrays["weather"] = None if self.weather is None else self.weather.to_array()
         save_npz(path, arrays | {"delay_s": self.delay_s})
 
     @classmethod
@@ -108,10 +112,13 @@ class Returns:
         ------
         NotFoundError, InputError
         """
-        names = [f.name for f in fields(cls)]
+        names = [f.name for f in fields(cls) if f.name != "weather"]
         arrays: dict[str, Any] = load_npz(path, names)
         values = {name: arrays[name] for name in names}
-        return cls(**(values | {"center_hz": float(values["center_hz"]), "model": str(values["model"])}))
+        values |= {"center_hz": float(values["center_hz"]), "model": str(values["model"])}
+        if "weather" in arrays:
+            values["weather"] = Weather.from_array(arrays["weather"])
+        return cls(**values)
 
 
 def illuminate(

@@ -36,6 +36,30 @@ class Weather:
     fog_visibility_m: float | None = None
     temperature_c: float = 15.0
 
+    def two_way_loss(self, range_m: ArrayLike, frequency_hz: float, polarization: str) -> FloatArray:
+        """Return the linear factor, >= 1, by which the way out and back divides an echo's power."""
+        from .physics.attenuation import two_way_loss
+
+        return two_way_loss(
+            range_m,
+            frequency_hz,
+            rain_mm_h=self.rain_mm_h,
+            fog_visibility_m=self.fog_visibility_m,
+            temperature_c=self.temperature_c,
+            polarization=polarization[0],
+        )
+
+    def to_array(self) -> FloatArray:
+        """Return (3,) rain, visibility (infinite when clear) and temperature, for files."""
+        fog = np.inf if self.fog_visibility_m is None else self.fog_visibility_m
+        return np.array([self.rain_mm_h, fog, self.temperature_c])
+
+    @classmethod
+    def from_array(cls, values: ArrayLike) -> Self:
+        """Undo :meth:`to_array`."""
+        rain, fog, temperature = (float(v) for v in np.asarray(values))
+        return cls(rain, None if np.isinf(fog) else fog, temperature)
+
 
 @dataclass(frozen=True)
 class Scatterers:
@@ -199,9 +223,7 @@ class Scatterers:
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "weather"}
         arrays["material_names"] = np.asarray(self.material_names, dtype=str)
         if self.weather is not None:
-            w = self.weather
-            fog = np.inf if w.fog_visibility_m is None else w.fog_visibility_m
-            arrays["weather"] = np.array([w.rain_mm_h, fog, w.temperature_c])
+            arrays["weather"] = self.weather.to_array()
         save_npz(path, arrays)
 
     @classmethod
@@ -217,8 +239,7 @@ class Scatterers:
         values: dict[str, Any] = {k: v[()] if v.ndim == 0 else v for k, v in arrays.items() if k in known}
         values["material_names"] = tuple(str(v) for v in arrays.get("material_names", ()))
         if "weather" in values:
-            rain, fog, temperature = (float(v) for v in values["weather"])
-            values["weather"] = Weather(rain, None if np.isinf(fog) else fog, temperature)
+            values["weather"] = Weather.from_array(values["weather"])
         for name, kind in (("radar", str), ("backend", str), ("door", str), ("seed", int), ("frame", int)):
             if name in values:
                 values[name] = kind(values[name])

@@ -14,6 +14,7 @@ from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from ..errors import InputError
 from ..io.npz import load_npz, save_npz
+from ..scatterers import Weather
 from . import angle
 from .multiplex import LoopCode
 from .spectra import doppler_spectrum, range_spectrum
@@ -47,6 +48,8 @@ class RadarCube:
         Lengths of the range and the Doppler transform.
     noise_added : bool
         Whether the samples carry thermal noise; without it detection takes the nominal level for its floor.
+    weather : Weather or None
+        Whose attenuation the echoes had.
     returns : Returns or None
         The echoes behind it, for truth attribution; not saved.
     """
@@ -57,6 +60,7 @@ class RadarCube:
     doppler_window: str = "hann"
     n_fft: tuple[int, int] = (0, 0)
     noise_added: bool = True
+    weather: Weather | None = None
     returns: Returns | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -159,7 +163,8 @@ class RadarCube:
         names = ["data", "range_m", "velocity_mps", "azimuth_rad", "range_doppler", "range_azimuth"]
         names += ["range_window", "doppler_window", "n_fft", "noise_added", "noise_power_w"]
         arrays: dict[str, Any] = {name: getattr(self, name) for name in names}
-        save_npz(path, arrays | {"profile": self.profile.model_dump_json()})
+        weather = None if self.weather is None else self.weather.to_array()
+        save_npz(path, arrays | {"profile": self.profile.model_dump_json(), "weather": weather})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -179,6 +184,7 @@ class RadarCube:
             doppler_window=str(arrays["doppler_window"]),
             n_fft=(int(arrays["n_fft"][0]), int(arrays["n_fft"][1])),
             noise_added=bool(arrays.get("noise_added", True)),
+            weather=Weather.from_array(arrays["weather"]) if "weather" in arrays else None,
         )
 
 
@@ -250,5 +256,6 @@ def process(
         doppler_window=doppler_window,
         n_fft=lengths,
         noise_added=adc.noise_power_w > 0,
+        weather=adc.weather,
         returns=adc.returns,
     )

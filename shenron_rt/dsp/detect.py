@@ -291,11 +291,13 @@ def _snr_db(cube: RadarCube, peaks: _Peaks) -> FloatArray:
 def _rcs_dbsm(
     cube: RadarCube, power: FloatArray, distance: FloatArray, azimuth: FloatArray, elevation: FloatArray
 ) -> FloatArray:
-    """Invert the radar equation: P (4 pi)^3 R^4 / (Pt Gt Gr lambda^2 D^2) with the pattern D and the radome loss."""
+    """Invert the radar equation: P L (4 pi)^3 R^4 / (Pt Gt Gr lambda^2 D^2), pattern D, radome and weather loss L."""
     p = cube.profile
     gain = 10 ** ((p.antenna.gain_tx_dbi + p.antenna.gain_rx_dbi - p.antenna.radome_loss_db) / 10)
     pattern = np.asarray(p.pattern(azimuth, elevation), dtype=np.float64) ** 2
     per_unit = p.tx_power_w * gain * pattern * p.wavelength_m**2 / (FOUR_PI_CUBED * distance**4)
+    if cube.weather is not None:
+        per_unit = per_unit / cube.weather.two_way_loss(distance, p.center_hz, p.antenna.polarization)
     with np.errstate(divide="ignore"):
         level = 10 * np.log10(power / np.maximum(per_unit, 1e-300))
     return np.asarray(np.maximum(level, RCS_FLOOR_DBSM), dtype=np.float64)

@@ -8,7 +8,6 @@ import numpy as np
 
 from .._typing import FloatArray
 from ..frames import spherical
-from ..physics.attenuation import two_way_loss
 from ..scatterers import Weather
 
 if TYPE_CHECKING:
@@ -40,16 +39,6 @@ def link_amplitude(profile: RadarProfile, position: FloatArray, weather: Weather
     power = profile.tx_power_w * 10 ** (gain_db / 10)
     amplitude: FloatArray = np.sqrt(power) * one_way
     if weather is not None:
-        amplitude = amplitude / np.sqrt(_loss(profile, distance, weather))
+        amplitude = amplitude / np.sqrt(weather.two_way_loss(distance, profile.center_hz, antenna.polarization))
     return amplitude
 
-
-def _loss(profile: RadarProfile, distance: FloatArray, weather: Weather) -> FloatArray:
-    return two_way_loss(
-        distance,
-        profile.center_hz,
-        rain_mm_h=weather.rain_mm_h,
-        fog_visibility_m=weather.fog_visibility_m,
-        temperature_c=weather.temperature_c,
-        polarization=profile.antenna.polarization[0],
-    )

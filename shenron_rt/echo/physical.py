@@ -291,4 +291,5 @@ def _assemble(scatterers: Scatterers, echoes: list[_Echo], profile: RadarProfile
         scatterer=source,
         center_hz=profile.center_hz,
         model="physical",
+        weather=scatterers.weather,
     )

@@ -84,7 +84,7 @@ def synthesize(
         add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))
     cube = decode(profile, quantise(profile, raw))
     power = cube_noise_power(profile) if noise is not None else 0.0
-    return AdcCube(cube, profile, noise_power_w=power, seed=seed, frame=frame, returns=returns)
+    return AdcCube(cube, profile, noise_power_w=power, seed=seed, frame=frame, weather=returns.weather, returns=returns)
 
 
 def _fast(profile: RadarProfile, points: Points, accuracy: float) -> ComplexArray:
