@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import itertools
 import json
@@ -18,7 +19,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -33,8 +34,9 @@ if TYPE_CHECKING:
     from .synthesis.adc import AdcCube
 
 __all__ = [
-    "FrameLike", "Run", "default_folder", "frame_folder", "frame_summary", "load_run", "objects_summary",
-    "strongest_summary", "verify_manifest", "write_frame", "write_json", "write_manifest", "write_run",
+    "FrameLike", "Place", "Run", "check_target", "default_folder", "frame_folder", "frame_summary", "load_run",
+    "objects_summary", "plain", "strongest_summary", "verify_manifest", "write_frame", "write_json", "write_manifest",
+    "write_run",
 ]  # fmt: skip
 
 _MANIFEST = "manifest.json"
@@ -90,8 +92,16 @@ def check_target(folder: Path, overwrite: bool) -> None:
         )
 
 
+@dataclass
+class Place:
+    """Where a run is being written: ``partial`` is filled, ``folder`` is where it stands after the ``with`` block."""
+
+    partial: Path
+    folder: Path
+
+
 @contextlib.contextmanager
-def write_run(folder: Path, *, overwrite: bool = False) -> Iterator[Path]:
+def write_run(folder: Path, *, overwrite: bool = False, another: Callable[[], Path] | None = None) -> Iterator[Place]:
     """Give a temporary folder to fill, and move it to ``folder`` when the ``with`` block ends without an error.
 
     Parameters
@@ -100,6 +110,8 @@ def write_run(folder: Path, *, overwrite: bool = False) -> Iterator[Path]:
         Where the run shall stand. What stands there stays as it is until the new run is complete.
     overwrite : bool
         Replace a run that is there.
+    another : callable, optional
+        Names another folder if ``folder`` was taken while the run was written, so that its work is not lost.
 
     Raises
     ------
@@ -108,24 +120,36 @@ def write_run(folder: Path, *, overwrite: bool = False) -> Iterator[Path]:
     """
     check_target(folder, overwrite)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.partial-"))
+    place = Place(Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.partial-")), folder)
     try:
         umask = os.umask(0)
         os.umask(umask)
-        partial.chmod(0o777 & ~umask)  # mkdtemp gives 0700, which others on the team could not read
-        yield partial
-        write_manifest(partial)
-        _move_into_place(partial, folder, overwrite)
+        place.partial.chmod(0o777 & ~umask)  # mkdtemp gives 0700, which others on the team could not read
+        yield place
+        write_manifest(place.partial)
+        while not _move_into_place(place.partial, place.folder, overwrite):
+            if another is None:
+                check_target(place.folder, overwrite)
+                raise InputError(f"-o {place.folder}: was taken while the run was written; nothing was replaced")
+            place.folder = another()
     finally:
-        if partial.exists():
-            shutil.rmtree(partial, ignore_errors=True)
+        if place.partial.exists():
+            shutil.rmtree(place.partial, ignore_errors=True)
 
 
-def _move_into_place(partial: Path, folder: Path, overwrite: bool) -> None:
-    check_target(folder, overwrite)  # another run may have ended here meanwhile
+def _move_into_place(partial: Path, folder: Path, overwrite: bool) -> bool:
+    """Move the new run to its place; return False, with all left as it was, where another run has ended there."""
     if not folder.exists() or not any(folder.iterdir()):
-        partial.replace(folder)
-        return
+        try:
+            partial.replace(folder)
+        except OSError as error:
+            if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
+                return False
+            raise
+        return True
+    if not overwrite:
+        return False
+    check_target(folder, overwrite)
     aside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old-"))
     folder.replace(aside)
     try:
@@ -134,6 +158,7 @@ def _move_into_place(partial: Path, folder: Path, overwrite: bool) -> None:
         aside.replace(folder)
         raise
     shutil.rmtree(aside, ignore_errors=True)
+    return True
 
 
 # ---- what

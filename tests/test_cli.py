@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -169,6 +170,7 @@ def test_profiles_lists_all_and_shows_one_with_sources(capsys: pytest.CaptureFix
     assert "TI TIDUF76" in out
     assert "unconfirmed: recalled" in out
     assert "range_resolution_m" in out
+    assert "Unconfirmed or assumed: waveform.carrier_hz" in out
 
 
 def test_profiles_json_holds_given_derived_and_sources(capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,7 +198,16 @@ def test_materials_lists_and_shows_one(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["materials", "concrete"]) == 0
     assert "P.2040" in capsys.readouterr().out
     assert main(["materials", "concrete", "--json"]) == 0
-    assert "permittivity" in json.loads(capsys.readouterr().out)["given"]
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["given"]["permittivity"]["model"] == "p2040"
+    # ITU-R P.2040-3 concrete at 77 GHz: 5.24 - j 0.323, a normal reflection of ((sqrt(eps) - 1) / (sqrt(eps) + 1))^2,
+    # less exp(-(4 pi s / lambda)^2) of its roughness
+    index = complex(5.24, -0.323) ** 0.5
+    smooth = abs((index - 1) / (index + 1)) ** 2
+    rough = math.exp(-((4 * math.pi * shown["given"]["roughness_rms_m"] * 77e9 / 299_792_458) ** 2))
+    first = shown["surface"][0]
+    assert first["mirror_te_db"] == pytest.approx(10 * math.log10(smooth * rough), abs=0.02)
+    assert first["mirror_tm_db"] == pytest.approx(first["mirror_te_db"], abs=1e-6)
 
 
 def test_doctor_says_what_can_trace_rays(capsys: pytest.CaptureFixture[str]) -> None:

@@ -178,6 +178,12 @@ def test_a_crash_in_the_middle_leaves_the_old_run_intact(
     assert "planted" in capsys.readouterr().err
 
 
+def test_a_scene_without_radars_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("blind.yaml").write_text("version: 1\nradars: []\n")
+    assert main(["run", "blind.yaml"]) == 2
+    assert "no radars" in capsys.readouterr().err
+
+
 # ---- process
 def test_process_of_an_own_cube_gives_the_detections_of_the_run(capsys: pytest.CaptureFixture[str]) -> None:
     _run("-o", "a")
@@ -220,6 +226,9 @@ def test_process_reads_npy_and_dca1000_captures(capsys: pytest.CaptureFixture[st
 
 
 def test_process_refuses_a_capture_of_another_radar(capsys: pytest.CaptureFixture[str]) -> None:
+    np.savez("old.npz", data=np.zeros((1, 1, 4), complex), profile='{"name": "old"}')
+    assert main(["process", "old.npz"]) == 2
+    assert "old.npz: not an ADC cube that this version can read" in capsys.readouterr().err
     Path("adc.bin").write_bytes(bytes(1000))
     assert main(["process", "adc.bin", "--profile", "mmwcas"]) == 2
     assert "no whole number of frames" in capsys.readouterr().err

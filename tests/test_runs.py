@@ -24,13 +24,13 @@ def _tree(folder: Path) -> dict[str, bytes]:
 
 
 def _write(folder: Path, text: str, *, overwrite: bool = False) -> None:
-    with runs.write_run(folder, overwrite=overwrite) as partial:
-        runs.write_json(partial / "summary.json", {"version": "1", "radars": [], "text": text})
+    with runs.write_run(folder, overwrite=overwrite) as place:
+        runs.write_json(place.partial / "summary.json", {"version": "1", "radars": [], "text": text})
 
 
 def _crash(folder: Path, error: type[BaseException]) -> None:
-    with runs.write_run(folder, overwrite=True) as partial:
-        (partial / "summary.json").write_text("half")
+    with runs.write_run(folder, overwrite=True) as place:
+        (place.partial / "summary.json").write_text("half")
         raise error
 
 
@@ -102,9 +102,9 @@ def test_manifest_lists_size_and_sha256_of_every_other_file(tmp_path: Path) -> N
 
 
 def test_a_changed_or_missing_file_is_told(tmp_path: Path) -> None:
-    with runs.write_run(tmp_path / "run") as partial:
-        (partial / "a").write_text("a")
-        (partial / "b").write_text("b")
+    with runs.write_run(tmp_path / "run") as place:
+        (place.partial / "a").write_text("a")
+        (place.partial / "b").write_text("b")
     (tmp_path / "run" / "a").write_text("c")
     (tmp_path / "run" / "b").unlink()
     assert runs.verify_manifest(tmp_path / "run") == ["a: changed since the run", "b: missing"]
@@ -140,6 +140,32 @@ def test_overwrite_never_replaces_what_is_no_run(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is a file"), runs.write_run(tmp_path / "home" / "letter.txt", overwrite=True):
         pytest.fail("unreachable")
     assert (tmp_path / "home" / "letter.txt").read_text() == "mine"
+
+
+def test_a_run_that_ends_in_the_same_place_first_costs_no_work(tmp_path: Path) -> None:
+    def default() -> Path:
+        return runs.default_folder("braking", "awrl1432", tmp_path)
+
+    with runs.write_run(default(), another=default) as place:
+        runs.write_json(place.partial / "summary.json", {"text": "slow"})
+        _write(default(), "fast")
+    assert place.folder.name == "braking-awrl1432-2"
+    texts = {p.name: json.loads((p / "summary.json").read_text())["text"] for p in tmp_path.iterdir()}
+    assert texts == {"braking-awrl1432": "fast", "braking-awrl1432-2": "slow"}
+
+
+def test_a_given_place_taken_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+
+    def race() -> None:
+        with runs.write_run(folder) as place:
+            runs.write_json(place.partial / "summary.json", {"text": "slow"})
+            _write(folder, "fast")
+
+    with pytest.raises(InputError, match="not empty"):
+        race()
+    assert json.loads((folder / "summary.json").read_text())["text"] == "fast"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
 def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
@@ -181,11 +207,11 @@ def test_a_failed_move_puts_the_old_run_back(tmp_path: Path, monkeypatch: pytest
 
 def test_a_run_reads_back(tmp_path: Path) -> None:
     frames = [hand_made_frame(index=i) for i in (0, 1)]
-    with runs.write_run(tmp_path / "run") as partial:
+    with runs.write_run(tmp_path / "run") as place:
         for frame in frames:
-            runs.write_frame(runs.frame_folder(partial, "front", frame.frame), frame)
+            runs.write_frame(runs.frame_folder(place.partial, "front", frame.frame), frame)
         records = [runs.frame_summary(f, NAMES) for f in frames]
-        runs.write_json(partial / "summary.json", {"radars": [{"name": "front", "frames": records}]})
+        runs.write_json(place.partial / "summary.json", {"radars": [{"name": "front", "frames": records}]})
     run = runs.load_run(tmp_path / "run")
     assert run.radars == ["front"]
     assert [f.name for f in run.frames["front"]] == ["frame_000000", "frame_000001"]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError, NotFoundError
+from ..errors import InputError, NotFoundError, ShenronError
 from .common import (
     Json,
     Output,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..returns import Returns
     from ..synthesis.adc import AdcCube
 
-__all__ = ["process"]
+__all__ = ["load_cube", "process"]
 
 LayoutName = Literal["two_lane", "four_lane"]
 LevelName = Literal["watts", "counts", "noise"]
@@ -90,32 +91,32 @@ def process(
     if wanted.stop > len(cubes):
         raise InputError(f"--frames {frames}: {adc} has {len(cubes)} frames, 0:{len(cubes)} is all of them")
     used = cubes[0].profile
-    folder = output or runs.default_folder(adc.stem, used.name)
+    default = partial(runs.default_folder, adc.stem, used.name)
     with (
-        runs.write_run(folder, overwrite=overwrite) as partial,
+        runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place,
         progress(len(wanted), "processing", quiet=json_) as step,
     ):
         records = []
         for index in wanted:
             frame = _frame(cubes[index], index)
-            place = runs.frame_folder(partial, used.name, index)
-            runs.write_frame(place, frame)
+            folder = runs.frame_folder(place.partial, used.name, index)
+            runs.write_frame(folder, frame)
             if pictures:
                 from ..plot import write_pictures
 
-                write_pictures(place, frame, title=f"{adc.name} ({used.name}), frame {index}")
+                write_pictures(folder, frame, title=f"{adc.name} ({used.name}), frame {index}")
             records.append(runs.frame_summary(frame))
             step(advance=1)
         summary = _summary(adc, used, records)
-        runs.write_json(partial / "summary.json", summary)
-        _write_config(partial / "config.yaml", adc, used, layout, level)
+        runs.write_json(place.partial / "summary.json", summary)
+        _write_config(place.partial / "config.yaml", adc, used, layout, level)
     if json_:
         print_json(summary)
     else:
         from .report import show_run
 
         show_run(summary)
-        say(f"{folder}: written")
+        say(f"{place.folder}: written")
     return 0
 
 
@@ -166,12 +167,24 @@ def _read(
     return [dataclasses.replace(c, data=c.data * factor) for c in cubes]
 
 
+def load_cube(path: Path) -> AdcCube:
+    """Load an ``adc.npz``; a profile inside that is not one of this version is bad input, not an internal error."""
+    from ..synthesis.adc import AdcCube
+
+    try:
+        return AdcCube.load(path)
+    except ShenronError:
+        raise
+    except (ValueError, TypeError) as error:  # pydantic's and json's errors are ValueErrors
+        first = str(error).strip().splitlines()[0]
+        raise InputError(f"{path}: not an ADC cube that this version can read ({first})") from None
+
+
 def _own_cube(path: Path, name: str | None, overrides: Overrides) -> AdcCube:
     """Read an ``adc.npz``, with the echoes beside it where they are, for the truth of the detections."""
     from ..returns import Returns
-    from ..synthesis.adc import AdcCube
 
-    cube = AdcCube.load(path)
+    cube = load_cube(path)
     if name is not None and name != cube.profile.name:
         raise InputError(
             f"--profile {name}: {path} was made by {cube.profile.name!r}, whose axes it keeps; leave it out"

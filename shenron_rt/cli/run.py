@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -77,19 +78,21 @@ def run(
     options = _options(loaded.run, given)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
-    folder = output or runs.default_folder(loaded.name, _profile_label(loaded))
+    if not loaded.radars:
+        raise InputError(f"{scene}: the scene has no radars; give it at least one under radars:")
+    default = partial(runs.default_folder, loaded.name, _profile_label(loaded))
     started = clock.perf_counter()
-    with runs.write_run(folder, overwrite=overwrite) as partial:
-        summary = _render(loaded, options, partial, pictures=pictures, quiet=json_)
-        runs.write_json(partial / "summary.json", summary)
-        _write_config(partial / "config.yaml", loaded)
+    with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
+        summary = _render(loaded, options, place.partial, pictures=pictures, quiet=json_)
+        runs.write_json(place.partial / "summary.json", summary)
+        _write_config(place.partial / "config.yaml", loaded)
     if json_:
         print_json(summary)
     else:
         from .report import show_run
 
         show_run(summary)
-        say(f"{folder}: written in {clock.perf_counter() - started:.1f} s, {summary['backend']} backend")
+        say(f"{place.folder}: written in {clock.perf_counter() - started:.1f} s, {summary['backend']} backend")
     return 0
 
 
@@ -148,7 +151,7 @@ def _profile_label(scene: Scene) -> str:
     return "+".join(dict.fromkeys(scene.profile_of(r).name for r in scene.radars))
 
 
-def _render(scene: Scene, options: _Options, partial: Path, *, pictures: bool, quiet: bool) -> dict[str, Any]:
+def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quiet: bool) -> dict[str, Any]:
     """Write every frame of every radar and return the summary."""
     from .. import runs
     from ..pipeline import simulate
@@ -173,7 +176,7 @@ def _render(scene: Scene, options: _Options, partial: Path, *, pictures: bool, q
                     backend=options.backend,
                     accuracy=options.accuracy,
                 )
-                folder = runs.frame_folder(partial, mount.name, index)
+                folder = runs.frame_folder(root, mount.name, index)
                 runs.write_frame(folder, frame)
                 if pictures:
                     _draw(folder, scene, mount, used, frame, first=index == wanted.start)

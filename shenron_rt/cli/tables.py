@@ -10,9 +10,13 @@ from cyclopts import Parameter
 from .common import Json, Overrides, SetOptions, override_profile, print_json, say, show_table
 
 if TYPE_CHECKING:
+    from ..config.materials import Material
     from ..config.profile import RadarProfile
 
 __all__ = ["materials", "profiles"]
+
+_NOTHING_DB = -200.0
+_SURFACE_KEYS = ("incidence_deg", "mirror_te_db", "mirror_tm_db", "sigma0_vv_db", "sigma0_hh_db")
 
 
 def profiles(name: str | None = None, /, *, set_: SetOptions = None, json_: Json = False) -> int:
@@ -65,6 +69,7 @@ def _one_profile(profile: RadarProfile, as_json: bool) -> None:
     derived = [(key, f"{value:.6g}") for key, value in profile.derived().items()]
     derived += [(key, f"{value:.2f} one way") for key, value in losses.items()]
     show_table("Derived", ("number", "value"), derived)
+    say(f"Unconfirmed or assumed: {', '.join(profile.unconfirmed) or 'nothing'}")
 
 
 def _leaves(data: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
@@ -128,7 +133,7 @@ def materials(
     return 0
 
 
-def _permittivity(material: Any, frequency_ghz: float) -> str:
+def _permittivity(material: Material, frequency_ghz: float) -> str:
     from ..errors import InputError
 
     try:
@@ -138,15 +143,36 @@ def _permittivity(material: Any, frequency_ghz: float) -> str:
     return "perfect conductor" if abs(eps) > 1e4 else f"{eps.real:.3g} - j {abs(eps.imag):.3g}"
 
 
-def _one_material(name: str, material: Any, frequency_ghz: float, as_json: bool) -> None:
+def _one_material(name: str, material: Material, frequency_ghz: float, as_json: bool) -> None:
+    """Print an entry with its sources, and what its surface does to a wave over the angle of incidence."""
     given = material.model_dump(mode="json", exclude={"sources"}, exclude_none=True)
+    levels = _surface_levels(material, frequency_ghz * 1e9)
     if as_json:
-        print_json({"name": name, "given": given, "sources": dict(material.sources)})
+        surface = [dict(zip(_SURFACE_KEYS, row, strict=True)) for row in levels]
+        print_json(
+            {"name": name, "given": given, "sources": dict(material.sources), "ghz": frequency_ghz, "surface": surface}
+        )
         return
     say(f"{name}: permittivity {_permittivity(material, frequency_ghz)} at {frequency_ghz:g} GHz")
     # the values of a P.2040 entry stand in the recommendation itself
-    sources = ({"permittivity": "ITU-R P.2040-3, Table 3"} if material.permittivity.model == "p2040" else {}) | dict(
-        material.sources
-    )
+    standard = {"permittivity": "ITU-R P.2040-3, Table 3"} if material.permittivity.model == "p2040" else {}
+    sources = standard | dict(material.sources)
     rows = [(key, _shown(value), _source(sources, key)) for key, value in _leaves(given)]
     show_table("Given", ("key", "value", "source"), rows)
+    columns = ("incidence [deg]", "mirror TE [dB]", "mirror TM [dB]", "sigma0 VV [dB]", "sigma0 HH [dB]")
+    shown = [(f"{row[0]:g}", *(f"{v:z.1f}" if v > _NOTHING_DB else "none" for v in row[1:])) for row in levels]
+    show_table(f"Reflected power after roughness, and sigma0, at {frequency_ghz:g} GHz", columns, shown)
+
+
+def _surface_levels(material: Material, frequency_hz: float) -> list[tuple[float, ...]]:
+    """Return (angle [deg], mirror TE, mirror TM, sigma0 VV, sigma0 HH [dB]) of a few angles of incidence."""
+    import numpy as np
+
+    angle = np.array([0, 15, 30, 45, 60, 75, 85], dtype=np.float64)
+    cos = np.cos(np.radians(angle))
+    te, tm = material.reflection(frequency_hz, cos)
+    rough = material.coherent_factor(frequency_hz, cos)
+    powers = [np.abs(te * rough) ** 2, np.abs(tm * rough) ** 2]
+    powers += [material.sigma0(frequency_hz, cos, pol) for pol in ("VV", "HH")]
+    levels = [10 * np.log10(np.maximum(p, 10 ** (_NOTHING_DB / 10))) for p in powers]
+    return [tuple(float(v) for v in row) for row in np.column_stack([angle, *levels])]

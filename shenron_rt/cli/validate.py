@@ -183,9 +183,9 @@ def _mesh(path: Path) -> str:
 
 
 def _own_cube(path: Path) -> str:
-    from ..synthesis.adc import AdcCube
+    from .process import load_cube
 
-    return repr(AdcCube.load(path))
+    return repr(load_cube(path))
 
 
 def _foreign_adc(path: Path, profile: str | None) -> str:
