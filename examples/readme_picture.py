@@ -1,11 +1,13 @@
-"""Make the README's picture: ``python examples/readme_picture.py`` renders one frame and writes docs/images/readme.png.
+"""Make the README's pictures: ``python examples/readme_picture.py [FOLDER]``, by default in docs/images.
 
-Left the scene from above with the power that each patch of surface returns, right what the radar makes of it.
+readme.png: left the scene ``highway`` from above with the power that each place returns, right what the radar makes of
+it. braking.png: the range-azimuth picture of ``shenron-rt run braking``.
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from PIL import Image
 
 import shenron_rt as srt
+from shenron_rt.plot import write_pictures
 from shenron_rt.scene.world import World, build_world, load_bodies
 
-IMAGE = Path(__file__).resolve().parents[1] / "docs" / "images" / "readme.png"
+IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 SCENE = "highway"
 REACH_M, SIDE_M = 95.0, 24.0
 RING, NAME = "#35e0ff", {"color": "white", "fontsize": 9}
@@ -73,7 +77,8 @@ def range_doppler(axes: Axes, figure: Figure, frame: srt.Frame, names: dict[int,
         row = int(np.flatnonzero(found.object_id == number)[0])
         at = (found.velocity[row], found.range[row])
         side = -8 if at[0] > 0.6 * cube.velocity_mps[-1] else 8
-        folded = " (folded)" if found.ambiguous[row] else ""
+        truth = frame.scatterers.range_rate[frame.scatterers.object_id == number].mean()
+        folded = " (folded)" if abs(found.velocity[row] - truth) > frame.profile.max_velocity_mps else ""
         axes.annotate(
             names[int(number)] + folded,
             at,
@@ -104,8 +109,20 @@ def draw() -> Figure:
     return figure
 
 
+def birds_eye(target: Path) -> None:
+    """Write the range-azimuth picture of ``braking``, in 256 colours to keep it small."""
+    scene = srt.load_scene("braking")
+    frame = srt.simulate(scene)
+    with tempfile.TemporaryDirectory() as folder:
+        write_pictures(Path(folder), frame, names=scene.object_names(), title="braking")
+        with Image.open(Path(folder) / "range_azimuth.png") as picture:
+            picture.convert("RGB").quantize(256).save(target, optimize=True)
+
+
 if __name__ == "__main__":
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGE
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draw().savefig(target, metadata={"Software": None})
-    print(f"{target}: {target.stat().st_size / 1e3:.0f} kB")
+    images = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
+    images.mkdir(parents=True, exist_ok=True)
+    draw().savefig(images / "readme.png", metadata={"Software": None})
+    birds_eye(images / "braking.png")
+    for name in ("readme.png", "braking.png"):
+        print(f"{images / name}: {(images / name).stat().st_size / 1e3:.0f} kB")

@@ -87,7 +87,8 @@ def _slug(heading: str) -> str:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_links_resolve(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+    for target in re.findall(r"\]\(([^)\s]+)\)|<img src=\"([^\"]+)\"", text):
+        target = "".join(target)
         if re.match(r"https?://", target):
             continue
         path, _, anchor = target.partition("#")
@@ -105,7 +106,7 @@ def test_every_page_is_listed_and_every_picture_is_shown_and_small() -> None:
     shown = "".join(p.read_text(encoding="utf-8") for p in PAGES)
     assert [p.name for p in (ROOT / "docs").glob("*.md") if p.name != "index.md" and f"({p.name})" not in index] == []
     for picture in (ROOT / "docs/images").iterdir():
-        assert f"images/{picture.name})" in shown
+        assert re.search(rf"images/{picture.name}[)\"]", shown)
         assert picture.stat().st_size < 300_000
 
 
