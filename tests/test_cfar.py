@@ -109,7 +109,7 @@ def test_cells_at_the_ends_of_range_keep_the_rate(kind, rng):
     assert abs(hits / cells - pfa) < 5 * np.sqrt(pfa / cells) + (0.03 * pfa if kind == "os" else 0)
 
 
-@pytest.mark.parametrize(("kind", "frames"), [("ca", 183), ("go", 12), ("so", 12), ("os", 8)])  # 16384 cells a frame
+@pytest.mark.parametrize(("kind", "frames"), [("ca", 150), ("go", 12), ("so", 12), ("os", 8)])  # 16384 cells a frame
 def test_user_gets_the_pfa_asked_for_with_the_default_windows(kind, frames, rng):
     _count_default(kind, frames, rng)
 

@@ -93,23 +93,24 @@ def test_bounds_reproduce_the_reference_table(shared_reference):
 
 @pytest.mark.parametrize(("window", "bar"), [("rect", 1.2), ("taylor", 1.35)])
 def test_matched_interpolation_comes_close_to_the_bound(window, bar):
-    check(errors("awrl1432", window, 60), bar)
+    check(errors("awrl1432", window, 40), bar)
 
 
 def test_default_window_stays_below_two_bounds():
-    check(errors("awrl1432", "hann", 60), 1.85)
+    check(errors("awrl1432", "hann", 40), 1.85)
 
 
-@pytest.mark.parametrize("name", ["awrl1432boost", "radarbook2"])
-def test_bpm_and_tdm_arrays_meet_the_bar(name):
-    check(errors(name, "taylor", 12), 1.6)
+@pytest.mark.parametrize(("name", "draws"), [("awrl1432boost", 12), ("radarbook2", 5)])
+def test_bpm_and_tdm_arrays_meet_the_bar(name, draws):
+    check(errors(name, "taylor", draws), 1.6)
 
 
 @pytest.mark.parametrize("name", ["awrl1432", "awrl1432_137mhz", "awrl1432boost", "radarbook2"])
 @pytest.mark.parametrize("window", ["rect", "hann"])
 def test_without_noise_the_errors_are_a_small_part_of_the_bound(name, window):
     # what is left is the model: migration through cells, the slope of the residual video phase
-    assert np.abs(errors(name, window, 6, noise=None, seed=5)).max() < 0.3
+    draws = 2 if name == "radarbook2" else 6  # its cubes have 2 million samples
+    assert np.abs(errors(name, window, draws, noise=None, seed=5)).max() < 0.3
 
 
 @pytest.mark.slow

@@ -26,6 +26,9 @@ __all__ = ["detect", "local_maxima", "noise_threshold"]
 _ELEVATION_BEAMS = 33
 #: A second target in one range-Doppler cell: weakest power relative to the first, channels it takes to tell two.
 _SECOND_PART, _CHANNELS_FOR_TWO = 10**-1.2, 4
+#: Floor of the noise estimate of a cube that carries no noise, relative to the nominal noise: low enough that level
+#: tests find weak targets, high enough that rounding and far side lobes are none.
+_QUIET_FLOOR = 1e-4
 #: Gauss-Newton steps of a continued fit, and turns between two targets.
 _SHORT, _TURNS = 2, 2
 
@@ -45,7 +48,7 @@ def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> 
         lengths=lengths,
         n_fft=cube.n_fft,
         channels=cube.data.shape[2],
-        floor=0.0 if cube.noise_added else cube.noise_power_w,
+        floor=0.0 if cube.noise_added else _QUIET_FLOOR * cube.noise_power_w,
     )
 
 

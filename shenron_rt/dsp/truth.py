@@ -176,8 +176,8 @@ def attribute(
     Notes
     -----
     Echoes are gathered in half bins; each part is weighted with the response of both windows and of the array. An
-    object's coherent echoes add as phasors, its incoherent ones as powers. An object below the expected noise of the
-    beamformed cell does not count.
+    object's coherent echoes add as phasors, its incoherent ones as powers. Where noise was added an object below its
+    expected level in the beamformed cell does not count.
     """
     n = len(row)
     none = Attribution(np.full(n, -1), np.zeros(n, dtype=np.uint8), np.zeros(n), np.full(n, np.nan))
@@ -239,7 +239,7 @@ def _strongest(
     power = re**2 + im**2 + speckle
     best = np.argmax(power, axis=1)
     most = power[np.arange(n), best]
-    found = most > cube.noise_power_w / cube.profile.n_virtual
+    found = most > (cube.noise_power_w / cube.profile.n_virtual if cube.noise_added else 0.0)
     # tag and velocity: those of the object's strongest cluster in the cell
     own = clusters.power[cluster] * weight**2
     mine = np.flatnonzero(best[peak] == of_id.ravel()[cluster])
