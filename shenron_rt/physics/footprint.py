@@ -10,6 +10,7 @@ leading order in 1/K, which is below 1e-2 at 0.1 m and 24 GHz. The first term co
 Every straight edge is evaluated alike from both of its cells, so that the edges two cells share on one plane cancel: a
 smooth road at grazing incidence returns nothing but its rim, although each footprint there is metres long. Where the
 phase is nearly stationary the Fresnel integrals of a separable quadratic phase over the cell are used instead.
+Where the cell is oblique as well, both terms of F are integrated by quadrature along its edges.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ __all__ = ["interior", "tube_integral"]
 #: Phase along half an edge, if the edge followed the gradient, from which the contour is accurate (1e-3 of the cell's
 #: solid angle at this value, falling with its square) [rad].
 _SETTLED = 16.0
+#: Phase of the mixed term at the corner of a cell from which it counts [rad].
+_OBLIQUE = 0.02
+#: Range of phase over the corners of a cell that 24 nodes along an edge still follow [rad].
+_QUADRATURE = 40.0
 
 
 def tube_integral(
@@ -83,8 +88,11 @@ def tube_integral(
     stationary = ~settled.any(axis=0) | (holds & ~left_out.any(axis=0))
     far = np.flatnonzero(whole & ~stationary)
     result[far] = _contour(corners, far, wavenumber, left_out[:, far], holds[far])
-    near = np.flatnonzero(whole & stationary)
+    skew = corners.skewed(wavenumber)
+    near = np.flatnonzero(whole & stationary & ~skew)
     result[near] = _separable(direction[near], edges[near], normal[near], distance[near], wavenumber)
+    near = np.flatnonzero(whole & stationary & skew)
+    result[near] = _smooth_contour(corners, near, wavenumber)
     return result
 
 
@@ -158,6 +166,29 @@ class _Corners:
             self.half_square = np.stack([uu, vv])
             length = 2.0 * np.sqrt(np.stack([uu, vv, uu, vv]))
             self.slope = wavenumber * self.height * length * ratio * np.roll(ratio, -1, axis=0)
+        self.cross = 0.5 * uv - nu * nv - 0.25 * du * dv
+
+    def along(
+        self, i: int, rows: IntArray, t: FloatArray, wavenumber: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return m . w, w . w and the phase [rad] at ``t`` in [-1, 1] along edge ``i`` of some cells."""
+        j = (i + 1) % 4
+        cos = 0.5 * ((1.0 - t) * self.cosine[i, rows] + (1.0 + t) * self.cosine[j, rows])
+        square = 0.5 * ((1.0 - t) * self.square[i, rows] + (1.0 + t) * self.square[j, rows])
+        square = square - (1.0 - t * t) * self.half_square[i % 2, rows]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = self.height[rows] * np.sqrt(square) / cos
+        return cos, square, 2.0 * wavenumber * (reach - self.distance[rows])
+
+    def skewed(self, wavenumber: float) -> BoolArray:
+        """Return which cells have edges so oblique that the phase is no sum of one along u and one along v.
+
+        Those whose phase is too large for a quadrature along the edges stay out.
+        """
+        cross = 2.0 * wavenumber * self.height * np.abs(self.cross)
+        with np.errstate(invalid="ignore"):
+            span = np.max(self.phase, axis=0) - np.min(self.phase, axis=0)
+        return np.asarray((cross > _OBLIQUE) & (span < _QUADRATURE))
 
 
 def _contour(
@@ -182,15 +213,9 @@ def _edge(corners: _Corners, rows: IntArray, i: int, wavenumber: float) -> Compl
     ends = np.array([i, (i + 1) % 4])[:, None]
     cosine, square, phase = corners.cosine[ends, rows], corners.square[ends, rows], corners.phase[ends, rows]
     turn, half_square = corners.turn[i, rows], corners.half_square[i % 2, rows]
-    height, distance = corners.height[rows], corners.distance[rows]
     psi = np.arctan2(turn, square.mean(axis=0) - 2.0 * half_square - cosine[0] * cosine[1])
 
-    def along(t: FloatArray, pick: IntArray | slice) -> tuple[FloatArray, FloatArray, FloatArray]:
-        cos = 0.5 * ((1.0 - t) * cosine[0, pick] + (1.0 + t) * cosine[1, pick])
-        sq = 0.5 * ((1.0 - t) * square[0, pick] + (1.0 + t) * square[1, pick]) - (1.0 - t * t) * half_square[pick]
-        return cos, sq, 2.0 * wavenumber * (height[pick] * np.sqrt(sq) / cos - distance[pick])
-
-    _, _, middle = along(np.zeros(1), slice(None))
+    _, _, middle = corners.along(i, rows, np.zeros(1), wavenumber)
     linear, bend = 0.5 * (phase[1] - phase[0]), phase.mean(axis=0) - middle
     bent = np.where(np.abs(linear) < 200.0 * np.abs(bend), bend, 0.0)  # beyond that rounding would show
     mean = 0.5 * np.exp(-1j * (phase.mean(axis=0) - bent)) * _quadratic_phase(linear, bent)
@@ -199,10 +224,23 @@ def _edge(corners: _Corners, rows: IntArray, i: int, wavenumber: float) -> Compl
     uneven = (np.abs(bend) > 0.01) | (np.abs(psi) > 0.3)
     fine = np.flatnonzero(uneven & (np.abs(linear) + np.abs(bend) < 20.0) & (np.abs(psi) < 2.5))
     nodes, weights = _gauss()
-    cos, sq, exact = along(nodes[:, None], fine)
+    cos, sq, exact = corners.along(i, rows[fine], nodes[:, None], wavenumber)
     density = 0.5 * turn[fine] / (sq - cos**2) * cos**2 / sq
     value[fine] = weights @ (density * np.exp(-1j * exact))
     return value
+
+
+def _smooth_contour(corners: _Corners, rows: IntArray, wavenumber: float) -> ComplexArray:
+    """Return the contour integral of F dpsi with both terms of F, which has no pole at the normal."""
+    nodes, weights = _gauss()
+    height = corners.height[rows]
+    at_normal = np.exp(2j * wavenumber * (corners.distance[rows] - height))
+    total = np.zeros(len(rows), dtype=np.complex128)
+    for i in range(4):
+        cos, square, phase = corners.along(i, rows, nodes[:, None], wavenumber)
+        d_psi = 0.5 * corners.turn[i, rows] / np.maximum(square - cos**2, 1e-14)
+        total += weights @ (d_psi * (at_normal - cos**2 / square * np.exp(-1j * phase)))
+    return total / (2j * wavenumber * height)
 
 
 @functools.cache
