@@ -58,6 +58,14 @@ def test_two_lane_complex_words_are_i_i_q_q_receiver_by_receiver(tmp_path: Path)
             np.testing.assert_array_equal(cube.data[0, tx * 2 + rx], value * (1 - 1j))
 
 
+def test_a_capture_with_q_first_is_read_with_its_words_swapped(tmp_path: Path) -> None:
+    file = tmp_path / "adc_data.bin"
+    # one sample pair a receiver and chirp: Q0 Q1 I0 I1
+    file.write_bytes(np.array([3, 4, 1, 2] * 8, dtype="<i2").tobytes())
+    (cube,) = read_dca1000(file, _xwr18(), scale=1.0, swap_iq=True)
+    np.testing.assert_array_equal(cube.data[0, 0], [1 + 3j, 2 + 4j, 1 + 3j, 2 + 4j])
+
+
 def test_two_lane_real_words_are_the_samples_in_order(tmp_path: Path) -> None:
     file = tmp_path / "adc_data.bin"
     file.write_bytes(np.arange(16, dtype="<i2").tobytes())

@@ -37,6 +37,15 @@ LevelName = Literal["watts", "counts", "noise"]
 
 
 @dataclass(frozen=True)
+class _Format:
+    """What the caller says of a file that does not say it itself."""
+
+    layout: LayoutName
+    level: LevelName | None
+    swap_iq: bool
+
+
+@dataclass(frozen=True)
 class ProcessedFrame:
     """A frame that began as ADC data."""
 
@@ -67,6 +76,7 @@ def process(
             help="Unit of the file: watts (its square root), counts (of full_scale_dbm), noise (floor set nominal)."
         ),
     ] = None,
+    swap_iq: Annotated[bool, Parameter(negative=(), help="The .bin capture has Q before I.")] = False,
     pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
     json_: Json = False,
 ) -> int:
@@ -86,7 +96,7 @@ def process(
 
     overrides = Overrides(set_)
     overrides.only_profile("process")
-    cubes = _read(adc, profile, overrides, layout, level)
+    cubes = _read(adc, profile, overrides, _Format(layout, level, swap_iq))
     wanted = frame_range(frames) if frames else range(len(cubes))
     if wanted.stop > len(cubes):
         raise InputError(f"--frames {frames}: {adc} has {len(cubes)} frames, 0:{len(cubes)} is all of them")
@@ -109,7 +119,7 @@ def process(
             step(advance=1)
         summary = _summary(adc, used, records)
         runs.write_json(place.partial / "summary.json", summary)
-        _write_config(place.partial / "config.yaml", adc, used, layout, level)
+        _write_config(place.partial / "config.yaml", adc, used, _Format(layout, level, swap_iq))
     if json_:
         print_json(summary)
     else:
@@ -137,9 +147,7 @@ def _frame(cube: AdcCube, index: int) -> ProcessedFrame:
     return ProcessedFrame(cube, spectrum, found, index, returns=cube.returns)
 
 
-def _read(
-    path: Path, name: str | None, overrides: Overrides, layout: LayoutName, level: LevelName | None
-) -> list[AdcCube]:
+def _read(path: Path, name: str | None, overrides: Overrides, form: _Format) -> list[AdcCube]:
     """Return the frames of a file of any of the three kinds."""
     if not path.is_file():
         raise NotFoundError(f"{path}: no such file")
@@ -153,6 +161,7 @@ def _read(
     if name is None:
         raise InputError(f"{path}: --profile is needed, the file does not say which radar made it")
     used = override_profile(load_profile(name), overrides.profile)
+    level = form.level
     if level is None:
         counts = path.suffix == ".bin" and used.receiver.full_scale_dbm is not None
         level = "counts" if counts else "noise" if path.suffix == ".bin" else "watts"
@@ -160,7 +169,7 @@ def _read(
     if path.suffix == ".npy":
         cubes = read_npy(path, used, scale=scale)
     else:
-        cubes = read_dca1000(path, used, layout=layout, scale=scale)
+        cubes = read_dca1000(path, used, layout=form.layout, scale=scale, swap_iq=form.swap_iq)
     if level != "noise":
         return cubes
     factor = noise_floor_scale(cubes[0].data, used)
@@ -194,10 +203,10 @@ def _own_cube(path: Path, name: str | None, overrides: Overrides) -> AdcCube:
     return dataclasses.replace(cube, profile=override_profile(cube.profile, overrides.profile), returns=returns)
 
 
-def _write_config(path: Path, adc: Path, used: RadarProfile, layout: str, level: str | None) -> None:
+def _write_config(path: Path, adc: Path, used: RadarProfile, form: _Format) -> None:
     import yaml
 
-    source = {"adc": str(adc.resolve()), "layout": layout, "level": level}
+    source = {"adc": str(adc.resolve())} | dataclasses.asdict(form)
     data = {"process": source, "profile": used.model_dump(mode="json", exclude_none=True)}
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
     path.write_text(f"# Written by shenron-rt process.\n{text}", encoding="utf-8")

@@ -137,7 +137,12 @@ def _finite(data: NDArray[Any], file: Path) -> None:
 
 
 def read_dca1000(
-    path: str | os.PathLike[str], profile: RadarProfile, *, layout: Layout = "two_lane", scale: float | None = None
+    path: str | os.PathLike[str],
+    profile: RadarProfile,
+    *,
+    layout: Layout = "two_lane",
+    scale: float | None = None,
+    swap_iq: bool = False,
 ) -> list[AdcCube]:
     """Read a raw capture of a DCA1000 card (``adc_data.bin``, headers of the UDP packets removed).
 
@@ -151,6 +156,9 @@ def read_dca1000(
         See the module.
     scale : float, optional
         sqrt(W) per count; from ``receiver.full_scale_dbm`` where ``None``.
+    swap_iq : bool
+        The Q words come before the I words, as with the device's sample swap set to Q first. A capture read the wrong
+        way round has its ranges mirrored: near targets appear at the far end.
 
     Returns
     -------
@@ -178,6 +186,8 @@ def read_dca1000(
         )
     words = np.fromfile(file, dtype=_WORD).reshape(size // frame_bytes, chirps, -1)
     data = _unpack(words, rx, samples, parts, layout) * factor
+    if swap_iq and parts == 2:
+        data = data.imag + 1j * data.real
     return [_cube(_to_virtual(f, profile), profile, i) for i, f in enumerate(data)]
 
 
