@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -81,3 +83,16 @@ def test_installed_command_starts() -> None:
         [sys.executable, "-m", "shenron_rt.cli", "--version"], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip()[0].isdigit()
+
+
+def test_ci_runs_the_two_commands_of_the_readme() -> None:
+    script, readme = ROOT / ".ci" / "run", (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```bash\n(.*?)^```$", readme, flags=re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 2
+    assert all(len(block.strip().splitlines()) == 1 for block in blocks)
+    assert blocks[0].strip().endswith("shenron-rt run braking")
+    assert blocks[1].strip().endswith("pytest")
+    assert os.access(script, os.X_OK)
+    assert subprocess.run(["bash", "-n", str(script)], check=False).returncode == 0
+    steps = re.findall(r'^ *step "([^"]+)"', script.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert steps[-1] == "README: install and test"  # pytest's closing line is what one sees last
