@@ -28,6 +28,8 @@ _ELEVATION_STEPS = 32
 _TABLE_STEP = 32
 #: Largest dense key space of the gathering; above it keys are sorted.
 _DENSE_KEYS = 1 << 23
+#: Pairs of peak and cluster looked at together; bounds the memory at about 100 MB.
+_PAIRS_AT_ONCE = 1 << 21
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class _Clusters:
 
     ``part`` (n, 2) integer position in parts of a bin, ``cosines`` (n, 2) direction along y and z, ``object_id``,
     ``tag``, ``phasor`` the sum of the coherent echoes about the middle of the array, ``speckle`` the power of the
-    others, ``power`` of all, ``velocity`` their power-weighted mean [m/s].
+    others, ``power`` of all, ``velocity`` of one of them [m/s].
     """
 
     part: IntArray
@@ -117,33 +119,33 @@ def _gather(cube: RadarCube, returns: Returns, row: IntArray, column: IntArray) 
     p = cube.profile
     i, j, distance, radial = _parts(cube, returns)
     number = _near(cube, row, column)
-    cell = number[i, j]
+    cell = number.ravel().take(i * np.int32(number.shape[1]) + j)
     close = np.flatnonzero(cell >= 0)
-    cosines = returns.position[close, 1:] / distance[close, None]
-    steps = (
-        max(64, len(cube.azimuth_sine)),
-        _ELEVATION_STEPS if angle.has_elevation(p.positions_m, p.wavelength_m) else 1,
-    )
-    beams = [np.minimum(((cosines[:, k] + 1) / 2 * n).astype(np.int64), n - 1) for k, n in enumerate(steps)]
-    ids, tags = returns.object_id[close].astype(np.int64), returns.tag[close].astype(np.int64)
-    which, labels = _compact([ids, tags], [int(ids.max(initial=0)) + 1, 256])
-    sizes = [int(number.max()) + 1, labels, *steps]
-    cluster, count = _compact([cell[close], which, *beams], sizes)
-    amplitude, coherent = returns.amplitude[close], returns.coherent[close]
+    away = distance.take(close)
+    keys, sizes = [cell.take(close)], [int(number.max()) + 1]
+    ids, tags = returns.object_id.take(close).astype(np.int64), returns.tag.take(close)
+    label, labels = _compact([ids, tags], [int(ids.max(initial=0)) + 1, 256])
+    keys, sizes = [*keys, label], [*sizes, labels]
+    beams = {1: max(64, len(cube.azimuth_sine))}
+    if angle.has_elevation(p.positions_m, p.wavelength_m):
+        beams[2] = _ELEVATION_STEPS
+    for axis, n in beams.items():
+        cosine = returns.position[:, axis].take(close) / away
+        keys, sizes = [*keys, np.minimum((cosine * (n / 2) + n / 2).astype(np.int32), n - 1)], [*sizes, n]
+    cluster, count = _compact(keys, sizes)
+    amplitude, coherent = returns.amplitude.take(close), returns.coherent.take(close)
     power = amplitude.real**2 + amplitude.imag**2
-    total = np.bincount(cluster, power, count)
-    member = np.zeros(count, dtype=np.int64)
-    member[cluster] = np.arange(len(close))
-    some = close[member]
+    some = np.zeros(count, dtype=np.int64)
+    some[cluster] = close
     return _Clusters(
         part=np.stack([i[some], j[some]], axis=1),
-        cosines=cosines[member],
+        cosines=returns.position[some, 1:] / distance[some, None],
         object_id=returns.object_id[some].astype(np.int64),
         tag=returns.tag[some],
         phasor=_phasor_sum(cube, returns, close[coherent], distance, cluster[coherent], count),
         speckle=np.bincount(cluster, np.where(coherent, 0.0, power), count).astype(np.float64),
-        power=total.astype(np.float64),
-        velocity=np.bincount(cluster, power * radial[close], count) / np.maximum(total, 1e-300),
+        power=np.bincount(cluster, power, count).astype(np.float64),
+        velocity=radial[some],
     )
 
 
@@ -186,15 +188,28 @@ def attribute(
     clusters = _gather(cube, returns, row, column)
     if not len(clusters.tag):
         return none
-    off = [_offset(clusters.part[:, k], at, cube.data.shape[k]) for k, at in enumerate((row, column))]
-    reach = [_REACH_BINS * k for k in _stride(cube)]
-    peak, cluster = np.nonzero((np.abs(off[0]) <= reach[0]) & (np.abs(off[1]) <= reach[1]))
-    off_r, off_d = off[0][peak, cluster], off[1][peak, cluster]
+    peak, cluster, off_r, off_d = _pairs(cube, clusters.part, row, column)
     w = cube.profile.waveform
     weight = _response(cube.range_window, w.samples, cube.n_fft[0], off_r)
     weight = weight * _response(cube.doppler_window, w.chirps, cube.n_fft[1], off_d)
     ds, de = clusters.cosines[cluster, 0] - sine[peak], clusters.cosines[cluster, 1] - elevation[peak]
     return _strongest(cube, clusters, peak, cluster, weight * _array_response(cube, ds, de), n)
+
+
+def _pairs(
+    cube: RadarCube, part: IntArray, row: IntArray, column: IntArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return peaks and clusters within reach of each other, and their distance in range and Doppler [bins]."""
+    reach = [_REACH_BINS * k for k in _stride(cube)]
+    found = []
+    peaks = max(1, _PAIRS_AT_ONCE // max(1, len(part)))
+    for first in range(0, len(row), peaks):
+        some = slice(first, first + peaks)
+        off = [_offset(part[:, k], at[some], cube.data.shape[k]) for k, at in enumerate((row, column))]
+        peak, cluster = np.nonzero((np.abs(off[0]) <= reach[0]) & (np.abs(off[1]) <= reach[1]))
+        found.append((peak + first, cluster, off[0][peak, cluster], off[1][peak, cluster]))
+    peak, cluster, off_r, off_d = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    return peak, cluster, off_r, off_d
 
 
 def _offset(part: IntArray, at: IntArray, size: int) -> FloatArray:
