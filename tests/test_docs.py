@@ -6,6 +6,7 @@ import dataclasses
 import doctest
 import importlib
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -178,3 +179,22 @@ def test_the_picture_of_the_data_flow_is_made_by_its_script(tmp_path: Path) -> N
     for value in ("Scatterers", "Returns", "AdcCube", "RadarCube", "Detections"):
         assert f'("{value}"' in source
         assert hasattr(srt, value)
+
+
+@pytest.mark.parametrize("number", range(len(_blocks(ROOT / "docs/guide.md", "python"))))
+def test_python_of_the_guide_runs(number: int) -> None:
+    exec(compile(_blocks(ROOT / "docs/guide.md", "python")[number], f"guide.md-{number}", "exec"), {})
+
+
+def _commands() -> list[str]:
+    text = "\n".join(block for page in PAGES for block in _blocks(page, "bash"))
+    return re.findall(r"(?:^|&& )(?:\.venv/bin/)?(shenron-rt [^#&\n]*)", text, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("line", _commands())
+def test_command_lines_of_the_docs_parse(line: str) -> None:
+    from shenron_rt.cli import build_app
+
+    command, bound, *_ = build_app().parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
+    assert command.__name__ == line.split()[1]
+    assert isinstance(bound.arguments, dict)
