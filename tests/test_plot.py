@@ -160,6 +160,8 @@ def test_feature_edges_are_the_creases_and_borders() -> None:
     assert len(edges) == 12, "the diagonals of the six faces are flat"
     assert sorted(lengths) == pytest.approx([2.0] * 8 + [4.0] * 4)
     assert len(feature_edges(BOX_VERTICES, BOX_FACES[:2])) == 4, "a border counts"
+    # three vertices of its own for every face, as game-engine exporters write them
+    assert len(feature_edges(BOX_VERTICES[BOX_FACES].reshape(-1, 3), np.arange(36).reshape(-1, 3))) == 12
 
 
 def test_antenna_cuts_state_the_loss_far_off_boresight() -> None:

@@ -64,6 +64,11 @@ def write_pictures(
     scatterers = getattr(frame, "scatterers", None)
     if scatterers is not None:
         figures["top_view"] = top_view(
-            scatterers, getattr(frame, "returns", None), found, mesh=mesh, title=f"{head}scatterers, top view"
+            scatterers,
+            getattr(frame, "returns", None),
+            found,
+            mesh=mesh,
+            reach_m=cube.profile.max_range_m,
+            title=f"{head}scatterers, top view",
         )
     return [save(figure, folder / f"{name}.png") for name, figure in figures.items()]

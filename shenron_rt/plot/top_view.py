@@ -49,7 +49,7 @@ def top_view(
     mesh : ((v, 3) float, (f, 3) int), optional
         Vertices [m] and faces in the radar frame.
     reach_m : float, optional
-        Range shown; the 99.9th percentile of the scatterers by default.
+        Nothing farther is shown; where all scatterers are nearer, the picture ends with them.
     title : str
 
     Returns
@@ -107,7 +107,7 @@ def _window(scatterers: Scatterers, reach_m: float | None) -> tuple[float, float
         far, wide = reach_m or 50.0, (reach_m or 50.0) / 2
     else:
         x, y = scatterers.position[:, 0], np.abs(scatterers.position[:, 1])
-        far = reach_m or float(np.percentile(x, 99.9)) * 1.05 + 2
+        far = min(float(np.percentile(x, 99.9)) * 1.05 + 2, reach_m or np.inf)
         wide = float(np.percentile(y[x <= far], 99)) * 1.1 + 2 if np.any(x <= far) else far / 2
     half = float(np.clip(wide, 0.25 * far, 0.65 * far))
     return -0.03 * far, far, half
@@ -150,7 +150,8 @@ def feature_edges(vertices: ArrayLike, faces: ArrayLike, angle_deg: float = _FEA
     angle_deg : float
         Creases turn by more than this.
     """
-    p, f = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    p = np.asarray(vertices, dtype=np.float64)
+    f = _welded(p, np.asarray(faces, dtype=np.int64))
     normal = np.cross(p[f[:, 1]] - p[f[:, 0]], p[f[:, 2]] - p[f[:, 0]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
     edges = np.sort(f[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -165,6 +166,17 @@ def feature_edges(vertices: ArrayLike, faces: ArrayLike, angle_deg: float = _FEA
     keep[pair] = turn < np.cos(np.radians(angle_deg))
     picked: IntArray = edges[order[first[keep]]]
     return picked
+
+
+def _welded(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """Return faces whose corners in the same millimetre are one: exporters repeat a vertex for every face normal."""
+    cell = np.rint(vertices * 1e3).astype(np.int64).view(np.uint64)
+    # one word a cell, by the odd multipliers of SplitMix64 (Steele, Lea, Flood 2014); a clash would cost one drawn edge
+    key = cell[:, 0] * np.uint64(0x9E3779B97F4A7C15) ^ cell[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
+    key ^= cell[:, 2] * np.uint64(0x94D049BB133111EB)
+    _, first, joined = np.unique(key, return_index=True, return_inverse=True)
+    welded: IntArray = first[joined][faces]
+    return welded
 
 
 def _edge_mask(vertices: FloatArray, faces: IntArray, grid: _Grid) -> IntArray:
