@@ -57,22 +57,36 @@ def facet_amplitudes(vertices, faces, radar, frequency_hz, reflectivity=1.0):
     return scale * reflectivity * cosine * spread * 2.0 * area * phase * _triangle_transform(u, v)
 
 
-def lit(mesh, radar):
-    """Return (f,) bool: the centroid of the face sees the radar. ``mesh``: trimesh.Trimesh."""
-    path = radar - mesh.triangles_center
-    distance = np.linalg.norm(path, axis=1)
-    way = path / distance[:, None]
-    front = np.einsum("ij,ij->i", way, mesh.face_normals) > 0
-    seen = np.zeros(len(front), dtype=bool)
-    start = mesh.triangles_center[front] + 1e-4 * way[front]
-    seen[front] = ~mesh.ray.intersects_any(start, way[front])
-    return seen
+def lit(mesh, radar, cell_rad=1.2e-3):
+    """Return (f,) bool: the face is turned to the radar and nothing stands before its centroid. ``mesh``: TaggedMesh.
+
+    A depth buffer of ``cell_rad`` (3 cm at 25 m), into which every face writes seven points. A face may lie as much
+    deeper than what else is in its cell as its own slope explains, and 7 mm. Solids are closed, so winding tells the
+    front.
+    """
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    centre = (a + b + c) / 3.0
+    to_radar = radar - centre
+    cosine = np.einsum("ij,ij->i", to_radar, mesh.face_normal) / np.linalg.norm(to_radar, axis=1)
+    front = cosine > 0
+    points = np.stack([centre, a, b, c, (a + b) / 2, (b + c) / 2, (c + a) / 2]) - radar
+    distance = np.linalg.norm(points, axis=-1)
+    azimuth = np.arctan2(points[..., 1], points[..., 0]) - np.arctan2(-radar[1], -radar[0])
+    azimuth = (azimuth + np.pi) % (2 * np.pi) - np.pi
+    bins = np.stack([azimuth, np.arcsin(points[..., 2] / distance)], axis=-1)
+    bins = np.floor(bins / cell_rad).astype(np.int64)
+    bins -= bins.min(axis=(0, 1))
+    cell = bins[..., 0] * (bins[..., 1].max() + 1) + bins[..., 1]
+    nearest = np.full(cell.max() + 1, np.inf)
+    np.minimum.at(nearest, cell.ravel(), distance.ravel())
+    steepness = np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2) / np.maximum(cosine, 1e-3)
+    slack = 0.007 + 2.0 * cell_rad * distance[0] * steepness
+    return front & (distance[0] < nearest[cell[0]] + slack)
 
 
-def apparent_rcs(mesh, radar, frequency_hz, reflectivity=1.0, occlusion=True):
-    """Return sigma [m^2], the radar equation inverted at the range of the origin."""
+def apparent_rcs(mesh, radar, frequency_hz, reflectivity=1.0):
+    """Return sigma [m^2], the radar equation inverted at the range of the origin; hidden faces do not count."""
     radar = np.asarray(radar, dtype=float)
-    amplitude = facet_amplitudes(mesh.vertices, mesh.faces, radar, frequency_hz, reflectivity)
-    if occlusion:
-        amplitude = amplitude[lit(mesh, radar)]
-    return abs(amplitude.sum()) ** 2
+    seen = lit(mesh, radar)
+    reflectivity = np.broadcast_to(reflectivity, seen.shape)[seen]
+    return abs(facet_amplitudes(mesh.vertices, mesh.faces[seen], radar, frequency_hz, reflectivity).sum()) ** 2

@@ -22,7 +22,7 @@ WHEEL_RADIUS = 0.33
 # and the vertical radius of the band that a level radar sees at right angles [m].
 _CORNER = 0.55
 _SPREAD_DEG = (6.0, 14.0, 7.0)
-_BAND_RADIUS = 7.5
+_BAND_RADIUS = 6.5
 _BAND_HALF_HEIGHT = 0.17
 # Beyond the band the flank leans in with these radii, and rounds over into bonnet or shoulder with the last one [m].
 _LEAN_RADIUS = 1.2

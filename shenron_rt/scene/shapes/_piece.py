@@ -11,10 +11,12 @@ from ..._typing import ArrayLike, FloatArray, IntArray
 from ...tags import SemanticTag
 
 __all__ = [
+    "LATTICE",
     "SAGITTA",
     "Piece",
     "box",
     "ellipsoid",
+    "fine_edge",
     "geodesic",
     "geodesic_frequency",
     "grid",
@@ -29,6 +31,9 @@ __all__ = [
 #: Largest distance between a facet and the curved surface it stands for [m]: a 600th of the wavelength at 77 GHz. Its
 #: two-way phase, 0.02 rad, stays below what any other step of the chain adds.
 SAGITTA = 6.5e-6
+#: Longest facet on canonical bodies [m]. Flat facets repeat an error with their period d; an echo of order m of that
+#: lattice comes back where 2 d sin(angle) = m lambda, so with d below lambda/2 at 81 GHz, 1.85 mm, there is none.
+LATTICE = 1.7e-3
 
 _SMALLEST_RING = 12
 
@@ -105,13 +110,14 @@ def grid(points: ArrayLike, *, wrap: bool = False) -> tuple[FloatArray, IntArray
     return vertices, faces[keep].astype(np.int32)
 
 
-def segments(radius: float, edge: float | None = None, sagitta: float = SAGITTA) -> int:
-    """Return into how many chords a circle of ``radius`` [m] is cut.
+def segments(radius: float, edge: float | None = None) -> int:
+    """Return into how many chords a circle of ``radius`` [m] is cut: no longer than ``edge`` or :func:`fine_edge`."""
+    return max(_SMALLEST_RING, int(np.ceil(2.0 * np.pi * radius / (fine_edge(radius) if edge is None else edge))))
 
-    Chords are no longer than ``edge`` [m] or, without one, deviate by no more than ``sagitta`` = s^2 / (8 radius).
-    """
-    chord = np.sqrt(8.0 * radius * sagitta) if edge is None else edge
-    return max(_SMALLEST_RING, int(np.ceil(2.0 * np.pi * radius / chord)))
+
+def fine_edge(radius: float) -> float:
+    """Return the facet length [m] at which physical optics no longer tells a curved surface from its facets."""
+    return float(min(np.sqrt(8.0 * radius * SAGITTA), LATTICE))
 
 
 def polygon(radius: float, n: int) -> FloatArray:
@@ -178,8 +184,8 @@ def box(length: float, width: float, height: float) -> tuple[FloatArray, IntArra
 
 
 def geodesic_frequency(radius: float, edge: float | None = None) -> int:
-    """Return the subdivision of the icosahedron whose mean edge on a sphere keeps to ``edge`` or the sagitta [m]."""
-    wanted = float(np.sqrt(8.0 * radius * SAGITTA)) if edge is None else edge
+    """Return the subdivision of the icosahedron with a mean edge up to ``edge`` or :func:`fine_edge` [m]."""
+    wanted = fine_edge(radius) if edge is None else edge
     # 20 n^2 facets of side s cover 4 pi r^2; an equilateral triangle has sqrt(3)/4 s^2.
     return max(1, int(np.ceil(radius * np.sqrt(4.0 * np.pi / (20.0 * np.sqrt(3.0) / 4.0)) / wanted)))
 

@@ -18,7 +18,7 @@ __all__ = ["box_shape", "cylinder", "dihedral", "disc", "plate", "sphere", "trih
 
 # A sphere finer than this is a typing error in `edge`, not a wish: 2 million facets need 0.5 GB while tracing.
 _MOST_FACETS = 2_000_000
-# Without `edge` no sphere takes more than 20 * 128^2 facets; from r = 0.6 m on they are longer than SAGITTA asks for.
+# Without `edge` no sphere takes more than 20 * 128^2 facets; from r = 0.18 m on they are longer than LATTICE.
 _FINEST_DEFAULT = 128
 
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -46,8 +46,8 @@ def disc(r: float, edge: float | None = None) -> list[Piece]:
 def sphere(r: float, edge: float | None = None) -> list[Piece]:
     """Return a sphere of radius ``r`` [m] about the origin.
 
-    Facets are nearly equal triangles with a mean side of ``edge`` [m]; by default their sagitta s^2 / (8 r) stays
-    below a 600th of the wavelength at 77 GHz, which gives 1.8 mm and 63 k facets at r = 0.1 m.
+    Facets are nearly equal triangles with a mean side of ``edge`` [m]; by default below half a wavelength at 81 GHz
+    and so flat that the sagitta s^2 / (8 r) stays under a 600th of the wavelength: 101 k facets at r = 0.1 m.
     """
     n = geodesic_frequency(r, edge)
     if edge is None:

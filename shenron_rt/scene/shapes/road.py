@@ -31,8 +31,7 @@ def wall(l: float, h: float, t: float = 0.3) -> list[Piece]:  # noqa: E741 - the
 
 def pole(h: float = 6.0, r: float = 0.08) -> list[Piece]:
     """Return a closed round metal pole of height ``h`` and radius ``r`` [m]."""
-    # A pole is met from metres away, where a 60th of a wavelength of sagitta already vanishes in the Fresnel zone.
-    n = segments(r, sagitta=65e-6)
+    n = segments(r)
     vertices, faces = revolve([[0.0, 0.0], [r, 0.0], [r, h], [0.0, h]], n)
     return [Piece("pole", "metal", SemanticTag.Poles, vertices, faces)]
 

@@ -15,7 +15,7 @@ _LENGTH, _WIDTH, _HEIGHT = 8.0, 2.5, 3.6
 _FLOOR = 1.05
 _CAB_LENGTH, _CAB_TOP = 2.0, 2.85
 _GAP = 0.12
-# Panels of real boxes bulge and dent by centimetres; a plane one would flash like a mirror the size of its Fresnel zone.
+# Panels of real boxes bulge and dent by centimetres; a plane one would flash like a mirror of its Fresnel zone.
 _BULGE = 0.03
 _PANEL_FACET = 0.2
 _WHEEL_RADIUS, _WHEEL_WIDTH = 0.48, 0.30
