@@ -317,6 +317,21 @@ def test_local_maxima_count_a_plateau_once_and_wrap_in_doppler():
     assert list(zip(*np.nonzero(local_maxima(power) & (power > 0)), strict=True)) == [(2, 3), (4, 7)]
 
 
+@pytest.mark.parametrize("chirps", [1, 2, 3, 8])
+def test_few_chirps_still_give_range_and_azimuth(chirps):
+    profile = load_profile("awrl1432", {"waveform.chirps": chirps})
+    found = detect(process(point_adc(profile, 30.1, 0.2, 0.0, 1e-9)))
+    assert found.range[0] == pytest.approx(30.1, abs=0.01)
+    assert found.azimuth[0] == pytest.approx(0.2, abs=2e-3)
+    assert found.velocity[0] == pytest.approx(0.0, abs=0.1)
+
+
+def test_single_receiver_gives_range_and_velocity_at_boresight():
+    profile = load_profile("awrl1432", {"array.line": 1})
+    found = detect(process(point_adc(profile, 30.1, 0.0, 4.0, 1e-9)))
+    assert (found.range[0], found.velocity[0], found.azimuth[0]) == pytest.approx((30.1, 4.0, 0.0), abs=0.01)
+
+
 def test_returns_without_position_do_not_break_attribution():
     profile = load_profile("awrl1432")
     base = point_returns(profile, [30.0, 40.0])

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
-from ..constants import FOUR_PI_CUBED, RCS_FLOOR_DBSM, SPEED_OF_LIGHT
+from ..constants import RCS_FLOOR_DBSM, SPEED_OF_LIGHT
 from ..errors import InputError
+from ..physics.link_budget import rcs_from_power
 from . import angle
 from .cfar import cfar_threshold, default_window
 from .detections import DETECTION_DTYPE, Detections
@@ -24,6 +25,8 @@ __all__ = ["detect", "local_maxima", "noise_threshold"]
 
 #: Elevation beams tried before the fit, across the visible sines.
 _ELEVATION_BEAMS = 33
+#: One-way pattern level below which the inverted radar equation stops.
+_PATTERN_FLOOR = 1e-6
 #: A second target in one range-Doppler cell: weakest power relative to the first, channels it takes to tell two.
 _SECOND_PART, _CHANNELS_FOR_TWO = 10**-1.2, 4
 #: Floor of the noise estimate of a cube that carries no noise, relative to the nominal noise: low enough that level
@@ -55,9 +58,10 @@ def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> 
 def local_maxima(power: FloatArray) -> BoolArray:
     """Mark cells not below any of their eight neighbours; Doppler wraps, of equal neighbours the first counts."""
     n_range, n_velocity = power.shape
-    box = np.pad(
-        np.take(power, np.arange(-1, n_velocity + 1), axis=1, mode="wrap"), ((1, 1), (0, 0)), constant_values=-1
-    )
+    wrapped = np.take(power, np.arange(-1, n_velocity + 1), axis=1, mode="wrap")
+    if n_velocity < 3:  # wrapping round would make a cell its own neighbour, or the other one its neighbour twice
+        wrapped[:, [0, -1]] = -1
+    box = np.pad(wrapped, ((1, 1), (0, 0)), constant_values=-1)
     peak = np.ones(power.shape, dtype=bool)
     for i in range(3):
         for j in range(3):
@@ -294,13 +298,14 @@ def _snr_db(cube: RadarCube, peaks: _Peaks) -> FloatArray:
 def _rcs_dbsm(
     cube: RadarCube, power: FloatArray, distance: FloatArray, azimuth: FloatArray, elevation: FloatArray
 ) -> FloatArray:
-    """Invert the radar equation: P L (4 pi)^3 R^4 / (Pt Gt Gr lambda^2 D^2), pattern D, radome and weather loss L."""
+    """Invert the radar equation at the estimated range and direction, pattern and radome loss removed."""
     p = cube.profile
-    gain = 10 ** ((p.antenna.gain_tx_dbi + p.antenna.gain_rx_dbi - p.antenna.radome_loss_db) / 10)
-    pattern = np.asarray(p.pattern(azimuth, elevation), dtype=np.float64) ** 2
-    per_unit = p.tx_power_w * gain * pattern * p.wavelength_m**2 / (FOUR_PI_CUBED * distance**4)
-    if cube.weather is not None:
-        per_unit = per_unit / cube.weather.two_way_loss(distance, p.center_hz, p.antenna.polarization)
+    pattern = np.asarray(p.pattern(azimuth, elevation), dtype=np.float64)
+    gain_tx, gain_rx, loss = (
+        10 ** (level / 10) for level in (p.antenna.gain_tx_dbi, p.antenna.gain_rx_dbi, p.antenna.radome_loss_db)
+    )
+    # behind a pattern's null no cross section can be told: keep the ratio finite
+    seen = np.maximum(pattern, _PATTERN_FLOOR)
+    area = rcs_from_power(power, distance, p.wavelength_m, p.tx_power_w, gain_tx * seen, gain_rx * seen, loss)
     with np.errstate(divide="ignore"):
-        level = 10 * np.log10(power / np.maximum(per_unit, 1e-300))
-    return np.asarray(np.maximum(level, RCS_FLOOR_DBSM), dtype=np.float64)
+        return np.asarray(np.maximum(10 * np.log10(area), RCS_FLOOR_DBSM), dtype=np.float64)

@@ -307,7 +307,8 @@ def fit_peaks(
         Gauss-Newton steps.
     """
     spans = np.ptp(elements.positions, axis=0)
-    limits = [_STEP_BINS * patch.range_axis.stride, _STEP_BINS * patch.doppler_axis.stride]
+    # a single cell along an axis says nothing about the position in it
+    limits = [_STEP_BINS * axis.stride * (axis.half > 0) for axis in (patch.range_axis, patch.doppler_axis)]
     limits += [_STEP_BEAMS * elements.wavelength_m / spans[k] for k in (1, 2) if elements.free[k - 1]]
     bound = np.array([_LIMIT_BINS * patch.range_axis.stride, _LIMIT_BINS * patch.doppler_axis.stride])
     s, e = sine.copy(), sine_elevation.copy()
