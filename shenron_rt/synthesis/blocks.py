@@ -21,7 +21,7 @@ __all__ = ["Block", "Group", "cut", "group_points"]
 
 #: Costs in nanoseconds, of one core, to choose by: of a transform per point and per point and term; per transform; per
 #: term and cell of its grid, and per term and sample; of the exact sum per point and sample.
-COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 100.0, 110.0, 1.5e6, 12.0, 80.0, 70.0
+COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 350.0, 60.0, 1.5e6, 8.0, 80.0, 70.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .blocks import Block
 from .signal import Points
@@ -38,17 +38,18 @@ class MovedPoints:
     speed_square: FloatArray
 
     @classmethod
-    def at(cls, points: Points, time_s: float) -> MovedPoints:
-        """Move points to an instant, seconds from mid-frame."""
-        p = np.ascontiguousarray((points.position + time_s * points.velocity).T)
-        v = np.ascontiguousarray(points.velocity.T)
-        return cls(points.amplitude, p, v, (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0))
+    def at(cls, points: Points, rows: IntArray, time_s: float) -> MovedPoints:
+        """Move some of the points to an instant, seconds from mid-frame."""
+        components = points.components.take(rows, axis=1)
+        v = components[3:]
+        p = components[:3] + time_s * v
+        return cls(points.amplitude[rows], p, v, (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0))
 
     def __len__(self) -> int:
         return len(self.amplitude)
 
-    def part(self, columns: slice) -> MovedPoints:
-        """Return a contiguous part."""
+    def part(self, columns: slice | IntArray) -> MovedPoints:
+        """Return some of them."""
         return MovedPoints(
             self.amplitude[columns],
             self.position[:, columns],

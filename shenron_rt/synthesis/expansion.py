@@ -84,11 +84,19 @@ def _factor_weights(amplitude: float, tolerance: float) -> list[float]:
 
 def monomials(values: Sequence[FloatArray], orders: list[Orders], out: FloatArray) -> FloatArray:
     """Write prod_i values_i^p_i of every term of :func:`series_orders` into the rows of ``out``, and return it."""
+    return _fill(values, _steps(orders), out)
+
+
+def _steps(orders: list[Orders]) -> list[tuple[int, int]]:
+    """Return, for every term but the first, the row of the term it is a multiple of and the factor between them."""
     place = {o: i for i, o in enumerate(orders)}
+    return [(place[less], i) for less, i in map(_less, orders[1:])]
+
+
+def _fill(values: Sequence[FloatArray], steps: list[tuple[int, int]], out: FloatArray) -> FloatArray:
     out[0] = 1.0
-    for row, o in zip(out[1:], orders[1:], strict=True):
-        less, i = _less(o)
-        np.multiply(values[i], out[place[less]], out=row)
+    for row, (less, i) in enumerate(steps, start=1):
+        np.multiply(values[i], out[less], out=out[row])
     return out
 
 
@@ -138,18 +146,18 @@ class LowRank:
         scale = np.array(
             [math.prod(a**p / math.factorial(p) for a, p in zip(amplitudes, o, strict=True)) for o in orders]
         )
-        scale = scale * np.array([1j ** (sum(o) % 4) for o in orders])
+        turn = np.array([1j ** (sum(o) % 4) for o in orders])
         x = monomials(parameters, orders, np.empty((len(orders), len(parameters[0])))).T
         b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
         q_x, r_x = np.linalg.qr(x)
-        _, r_b = np.linalg.qr(b.conj())
-        u, s, vh = np.linalg.svd(r_x @ r_b.conj().T)
+        r_b = np.linalg.qr(b, mode="r")
+        u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T)
         # row r of tails: RMS error of every echo where r terms are kept
         parts = np.abs(q_x @ u) ** 2 * s**2
         tails = np.sqrt(np.maximum(np.cumsum(parts[:, ::-1], axis=1)[:, ::-1], 0.0)).max(axis=0)
         kept = max(1, int(np.count_nonzero(tails > tolerance)))
-        left = r_b.conj().T @ vh[:kept].conj().T
-        right = (u[:, :kept].conj().T @ r_x) * scale / s[:kept, None]
+        left = turn[:, None] * (r_b.T @ vh[:kept].conj().T)
+        right = (u[:, :kept].conj().T @ r_x) * (turn * scale) / s[:kept, None]
         return cls(orders, left, right, np.sqrt(parts[:, :kept].max(axis=0)))
 
     def strengths(self, amplitude: ComplexArray, parameters: Sequence[FloatArray]) -> ComplexArray:
@@ -173,9 +181,9 @@ class LowRank:
 def _combine(matrix: ComplexArray, orders: list[Orders], values: Sequence[FloatArray], out: ComplexArray) -> None:
     """Write matrix (R, L) times the monomials (L, n) into ``out``, some columns at a time."""
     parts = np.concatenate([matrix.real, matrix.imag]).astype(out.real.dtype)
-    buffer = np.empty((len(orders), _COLUMNS), dtype=parts.dtype)
+    steps, buffer = _steps(orders), np.empty((len(orders), _COLUMNS), dtype=parts.dtype)
     for first in range(0, out.shape[1], _COLUMNS):
         columns = slice(first, first + _COLUMNS)
         cells = out[:, columns]
-        both = parts @ monomials([v[columns] for v in values], orders, buffer[:, : cells.shape[1]])
+        both = parts @ _fill([v[columns] for v in values], steps, buffer[:, : cells.shape[1]])
         cells.real, cells.imag = both[: len(out)], both[len(out) :]

@@ -25,6 +25,7 @@ import numpy as np
 
 from .._typing import ComplexArray, FloatArray
 from .blocks import Group, cut, group_points
+from .delays import MovedPoints
 from .direct import direct_field
 from .signal import Clock, Field, Points
 from .transform import NEGLECTED_SHARE, Prepared
@@ -84,13 +85,13 @@ def _jobs(
     """Yield the transforms of a field in a fixed order, with the place of each in the result."""
     cuts = {g.blocks: cut(clock, chirp_start_s, g.blocks) for g in groups if g.blocks}
     for group in groups:
-        part = points[group.rows]
         if group.blocks == 0:
+            part = points[group.rows]
             for j in range(len(rx_m)):
                 yield (slice(None), j), partial(_exact, clock, part, tx_m, rx_m[j], chirp_start_s)
             continue
         for block in cuts[group.blocks]:
-            ready = Prepared.of(accuracy, block, part, tx_m, rx_m)
+            ready = Prepared.of(accuracy, block, MovedPoints.at(points, group.rows, block.mid_s), tx_m, rx_m)
             for j, rx in enumerate(rx_m):
                 yield (block.chirps, j), partial(ready.transform, rx)
 

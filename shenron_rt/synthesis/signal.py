@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -57,6 +58,11 @@ class Points:
 
     def __getitem__(self, rows: slice | IntArray) -> Points:
         return Points(self.amplitude[rows], self.position[rows], self.velocity[rows])
+
+    @cached_property
+    def components(self) -> FloatArray:
+        """(6, n) position and velocity, a contiguous row each."""
+        return np.ascontiguousarray(np.concatenate([self.position.T, self.velocity.T]))
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,11 @@ from .._typing import ComplexArray, FloatArray, IntArray
 from .blocks import Block
 from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
-from .signal import Points
 
 __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 
 #: Shares of the accuracy: the transforms, the expansion, what is neglected.
-TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.3, 0.5, 0.1
+TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.45, 0.45, 0.1
 #: Rounding of a single-precision coordinate (RMS of half an ulp), and the finest accuracy single precision reaches.
 SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 2.5e-5
 #: Echoes whose residual phases choose the low-rank form, at each element pair probed.
@@ -63,15 +62,14 @@ class Prepared:
     waves: ComplexArray
 
     @classmethod
-    def of(cls, accuracy: float, block: Block, points: Points, tx_m: FloatArray, rx_m: FloatArray) -> Prepared:
+    def of(cls, accuracy: float, block: Block, moved: MovedPoints, tx_m: FloatArray, rx_m: FloatArray) -> Prepared:
         """Choose the low-rank form from the echoes, seen from the elements that differ most."""
-        moved = MovedPoints.at(points, block.mid_s)
         to_tx = moved.range_derivatives(tx_m, 4)
         every = tuple(range(N_RESIDUALS))
         probes = _probes(rx_m)
         seen = _residuals(block, moved, to_tx, probes[0], every)
         rows = _sample_rows(seen)
-        few = MovedPoints.at(points[rows], block.mid_s)
+        few = moved.part(rows)
         few_to_tx = [d[rows] for d in to_tx]
         sampled = np.concatenate([_residuals(block, few, few_to_tx, rx, every) for rx in probes], axis=1)
         low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
