@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 @lru_cache(maxsize=256)
 def _note_once(message: str) -> None:
-    _log.warning(message)
+    _log.info(message)
 
 
 class _Ranged(ConfigModel):

@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import BackendError, InputError, did_you_mean
@@ -33,6 +34,9 @@ FIX_LLVM = (
     "install LLVM 19 (apt-get install libllvm19) or point DRJIT_LIBLLVM_PATH at a libLLVM.so of version 19 or newer"
 )
 
+#: Without one of these a driver (Linux, or Windows' subsystem for it) is not there, and its variant need not be loaded.
+_CUDA_DEVICES = ("/dev/nvidiactl", "/dev/dxg")
+
 _log = logging.getLogger(__name__)
 
 
@@ -48,6 +52,8 @@ class Status:
 @functools.cache
 def backend_status(backend: Backend) -> Status:
     """Find out, without running a kernel in this process, whether a backend is usable."""
+    if backend == "cuda" and not any(Path(device).exists() for device in _CUDA_DEVICES):
+        return Status(backend, False, "no CUDA device or driver")
     with _quiet_stderr(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -84,7 +90,6 @@ def _check_cuda() -> Status:
 
 
 def _check_scalar() -> Status:
-
     return Status("scalar", True, f"Mitsuba {version('mitsuba')}, one ray at a time (slow)")
 
 
@@ -129,12 +134,12 @@ def choose_backend(wanted: str = "auto") -> Backend:
 
 @functools.cache
 def _auto() -> Backend:
-    # A machine without an NVIDIA driver need not load the CUDA variant to find that out.
-    order: tuple[Backend, ...] = ("cuda", "llvm") if os.path.exists("/dev/nvidiactl") else ("llvm",)  # noqa: PTH110
-    for backend in order:
+    for backend in get_args(Backend):
         status = backend_status(backend)
         if status.usable:
-            return backend
+            return backend  # type: ignore[no-any-return]
+        if backend == "cuda":  # most machines have none, and LLVM serves
+            continue
         _log.warning("backend %s: %s. Falling back to a slower one", backend, status.detail)
     return "scalar"
 
