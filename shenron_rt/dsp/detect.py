@@ -14,7 +14,8 @@ from ..physics.link_budget import rcs_from_power
 from . import angle
 from .cfar import cfar_threshold, default_window
 from .detections import DETECTION_DTYPE, Detections
-from .refine import Axis, Elements, PeakFit, PeakPatch, at_peak, fit_peaks, without
+from .elements import Elements
+from .refine import Axis, PeakFit, PeakPatch, at_peak, fit_peaks, without
 from .spectra import slow_time_offsets
 from .truth import Attribution, attribute
 
