@@ -92,9 +92,8 @@ def main() -> None:
     product = best(lambda: strength @ basis, args.repeat)[0] * scaled
     print(f"{'what':<44}{'wall s':>10}{'CPU s':>10}{'vs exp':>10}{'vs GEMM':>10}")
     print(f"{f'element-wise exp, {SUBSET} echoes scaled':<44}{exponential:>10.1f}{'':>10}{1:>10}")
-    print(
-        f"{f'GEMM of ready exponentials, {SUBSET} scaled':<44}{product:>10.2f}{'':>10}{exponential / product:>10.0f}{1:>10}"
-    )
+    label = f"GEMM of ready exponentials, {SUBSET} scaled"
+    print(f"{label:<44}{product:>10.2f}{'':>10}{exponential / product:>10.0f}{1:>10}")
     wall, cpu = best(bare_type1(n, profile), args.repeat)
     print(f"{'bare 3-D type 1, 1e-6, no corrections':<44}{wall:>10.3f}{cpu:>10.3f}{exponential / wall:>10.0f}")
     for motion in ("ego", "radial", "any"):

@@ -150,7 +150,7 @@ class LowRank:
         x = monomials(parameters, orders, np.empty((len(orders), len(parameters[0])))).T
         b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
         q_x, r_x = np.linalg.qr(x)
-        r_b = np.linalg.qr(b, mode="r")
+        _, r_b = np.linalg.qr(b)
         u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T)
         # row r of tails: RMS error of every echo where r terms are kept
         parts = np.abs(q_x @ u) ** 2 * s**2
