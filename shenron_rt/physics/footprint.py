@@ -226,8 +226,14 @@ def _edge(corners: _Corners, rows: IntArray, i: int, wavenumber: float) -> Compl
     nodes, weights = _gauss()
     cos, sq, exact = corners.along(i, rows[fine], nodes[:, None], wavenumber)
     density = 0.5 * turn[fine] / (sq - cos**2) * cos**2 / sq
-    value[fine] = weights @ (density * np.exp(-1j * exact))
+    value[fine] = _over_nodes(weights, density * np.exp(-1j * exact))
     return value
+
+
+def _over_nodes(weights: FloatArray, values: ComplexArray) -> ComplexArray:
+    """Return the weighted sum over the first axis; by ``@`` its last bit would depend on the number of BLAS threads."""
+    total: ComplexArray = np.einsum("k,kn->n", weights, values)
+    return total
 
 
 def _smooth_contour(corners: _Corners, rows: IntArray, wavenumber: float) -> ComplexArray:
@@ -239,7 +245,7 @@ def _smooth_contour(corners: _Corners, rows: IntArray, wavenumber: float) -> Com
     for i in range(4):
         cos, square, phase = corners.along(i, rows, nodes[:, None], wavenumber)
         d_psi = 0.5 * corners.turn[i, rows] / np.maximum(square - cos**2, 1e-14)
-        total += weights @ (d_psi * (at_normal - cos**2 / square * np.exp(-1j * phase)))
+        total += _over_nodes(weights, d_psi * (at_normal - cos**2 / square * np.exp(-1j * phase)))
     return total / (2j * wavenumber * height)
 
 
