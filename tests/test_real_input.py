@@ -99,7 +99,7 @@ def test_gazebo_objects_trace_and_echo_in_that_street(shared_data: Path) -> None
     origin = np.asarray(street.ego.xyz_m)
     meshes = {n: resolve_tags(read_mesh(shared_data / f"gazebo_road_objects/converted_m/{n}.ply")) for n in GAZEBO}
     placed = [
-        {"name": n, "id": 300 + k, "mesh": meshes[n], "aim": 3000, "xyz_m": tuple(origin + [2.0 + x, y, 0.0])}
+        {"name": n, "id": 300 + k, "mesh": meshes[n], "aim": 3000, "xyz_m": tuple(origin + np.array([2.0 + x, y, 0.0]))}
         for k, (n, (x, y)) in enumerate(GAZEBO.items())
     ]
     town = [part.model_dump() for part in street.static]
