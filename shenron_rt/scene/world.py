@@ -153,10 +153,12 @@ def load_bodies(scene: Scene) -> tuple[tuple[Body, ...], MaterialTable]:
     materials = load_materials(scene.materials)
     names = list(materials.materials)
     entries = [*scene.static, *scene.actors]
-    return tuple(_body(entry, scene.folder, materials, names) for entry in entries), materials
+    bodies = (_body(entry, scene.folder, materials, names) for entry in entries)
+    return tuple(body for body in bodies if body is not None), materials
 
 
-def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list[str]) -> Body:
+def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list[str]) -> Body | None:
+    """Return one entry's body without its sky, or None where that is all it has."""
     mesh = source_mesh(entry, folder)
     wanted = entry.tag and parse_tag(entry.tag)
     tags = [wanted or part.tag for part in mesh.parts]
@@ -171,6 +173,8 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
     index = np.array([names.index(str(m)) for m in material_of], dtype=np.uint16)
     face_tag = np.array([int(t) for t in tags], dtype=np.uint8)[mesh.part]
     keep = face_tag != int(SemanticTag.Sky)
+    if not keep.any():
+        return None
     if not keep.all():
         mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
     object_id = int(getattr(entry, "id", 0))
