@@ -10,9 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from .._typing import FloatArray, IntArray, NDArray
+from ..config._base import Placed
 from ..config.loader import resolve_path
 from ..config.materials import MaterialTable, load_materials
-from ..config.scene import Actor, MeshSource, RadarMount, Scene
+from ..config.scene import Actor, MeshSource, Scene
 from ..errors import InputError, did_you_mean
 from ..tags import SemanticTag, parse_tag
 from .mesh import TaggedMesh
@@ -198,14 +199,15 @@ def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
 
 
 def build_world(
-    scene: Scene, radar: RadarMount, time: float, bodies: tuple[Body, ...], materials: MaterialTable
+    scene: Scene, radar: Placed, time: float, bodies: tuple[Body, ...], materials: MaterialTable
 ) -> World:
     """Place every body as it stands at ``time``, as seen from ``radar``.
 
     Parameters
     ----------
     scene : Scene
-    radar : RadarMount
+    radar : RadarMount or LidarMount
+        Any sensor with a pose in the ego frame.
     time : float
         Scene seconds.
     bodies, materials

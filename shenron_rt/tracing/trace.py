@@ -10,8 +10,9 @@ import numpy as np
 
 from .._parallel import map_blocks, pool
 from .._typing import ComplexArray, FloatArray, IntArray, NDArray
+from ..config._base import Placed
 from ..config.profile import RadarProfile
-from ..config.scene import RadarMount, Scene
+from ..config.scene import Scene
 from ..errors import InputError
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
@@ -118,17 +119,10 @@ def trace(
     run_seed = scene.seed if seed is None else seed
     world, caster = _prepared(scene, mount, time + profile.frame_mid_s, choose_backend(backend))
 
-    base = _launch_pattern(profile, rays, run_seed, frame, mount.name)
-    aimed = {b: launch for b in range(len(world.bodies)) if (launch := _aim(world, b, run_seed, frame, mount.name))}
-    launches = [base, *aimed.values()]
+    aimed = _aims(world, run_seed, frame, mount.name)
+    launches = [_launch_pattern(profile, rays, run_seed, frame, mount.name), *aimed.values()]
     drawn = [pool().submit(launch.draw) for launch in launches]  # while the rays are under way
-    face = caster.cast(_directions(launches))
-    parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
-    # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
-    # what else there is, and no solid angle of an object counts twice.
-    own = np.append(np.isin(world.face_body, list(aimed)), False)  # a miss, -1, reads the last: scenes may be empty
-    hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
-    hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
+    parts, hits = _cast(world, caster, launches, list(aimed))
     rows = [
         block
         for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
@@ -146,6 +140,25 @@ def trace(
         backend=caster.backend,
         door="mesh",
     )
+
+
+def _aims(world: World, seed: int, frame: int, radar: str) -> dict[int, _Launch]:
+    """Return the launches of the bodies that have rays of their own, by body."""
+    return {b: launch for b in range(len(world.bodies)) if (launch := _aim(world, b, seed, frame, radar))}
+
+
+def _cast(
+    world: World, caster: RayCaster, launches: list[_Launch], aimed: list[int]
+) -> tuple[list[IntArray], list[IntArray]]:
+    """Return the face that each cell of each launch hits, and the cells that count; the first launch is the grid."""
+    face = caster.cast(_directions(launches))
+    parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
+    # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
+    # what else there is, and no solid angle of an object counts twice.
+    own = np.append(np.isin(world.face_body, aimed), False)  # a miss, -1, reads the last: scenes may be empty
+    hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
+    hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
+    return parts, hits
 
 
 @functools.lru_cache(maxsize=4)
@@ -169,7 +182,7 @@ class _SceneKey:
 _last: dict[str, tuple[object, World, RayCaster]] = {}
 
 
-def _prepared(scene: Scene, mount: RadarMount, time: float, backend: str) -> tuple[World, RayCaster]:
+def _prepared(scene: Scene, mount: Placed, time: float, backend: str) -> tuple[World, RayCaster]:
     """Return world and caster, kept from the last call when scene, radar pose and instant are the same."""
     key = (_SceneKey(scene), mount, time, backend)
     if "world" in _last and _last["world"][0] == key:
