@@ -22,7 +22,7 @@ from shenron_rt.constants import FOUR_PI_CUBED
 from shenron_rt.tracing.backend import backend_status, choose_backend
 
 ROOT = Path(__file__).resolve().parents[1]
-BEGIN, END = "<!-- results: python examples/results.py --write -->", "<!-- end of results -->"
+BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 PROFILE = srt.load_profile("awrl1432")
 MOUNT = {"name": "r", "xyz_m": (0, 0, 0)}
 
@@ -73,11 +73,11 @@ def levels() -> list[Row]:
         side = max(1.5 * distance, 20.0)
         mirror = apparent_rcs(f"plate:{side}x{side}", distance, seeds=10, shift=0.25 * side)
         rows.append(level(f"large metal plate at {distance:g} m (mirror, pi R^2)", np.pi * distance**2, mirror))
-    small = apparent_rcs("plate:0.1x0.1", 30.0, aim=2000)
+    small = apparent_rcs("plate:0.1x0.1", 30.0, aim=20_000)
     rows.append(
         level("0.1 m metal plate at 30 m (4 pi A^2/lambda^2)", 4 * np.pi * 1e-4 / PROFILE.wavelength_m**2, small)
     )
-    near = apparent_rcs("plate:0.3x0.3", 10.0, aim=2000)
+    near = apparent_rcs("plate:0.3x0.3", 10.0, aim=20_000)
     rows.append(level("0.3 m metal plate at 10 m (near range, direct sum)", near_range_plate(0.3, 10.0), near))
     sphere = apparent_rcs("sphere:r=0.1", 10.1, aim=20_000) * (10.0 / 10.1) ** 4
     rows.append(level("0.1 m radius metal sphere, 10 m to its nearest point (pi a^2)", np.pi * 0.01, sphere))
