@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .errors import NotFoundError as NotFoundError
     from .errors import ShenronError as ShenronError
     from .frames import Pose as Pose
+    from .lidar.frame import LidarFrame as LidarFrame
+    from .lidar.read import read_semantic_lidar as read_semantic_lidar
     from .pipeline import Frame as Frame
     from .pipeline import simulate as simulate
     from .pipeline import simulate_all as simulate_all
@@ -48,6 +50,7 @@ _HOME = {
     "Detections": "dsp",
     "Frame": "pipeline",
     "InputError": "errors",
+    "LidarFrame": "lidar.frame",
     "Material": "config.materials",
     "MaterialTable": "config.materials",
     "NotFoundError": "errors",
@@ -68,6 +71,7 @@ _HOME = {
     "make_shape": "scene.shapes",
     "process": "dsp",
     "read_mesh": "scene.readers",
+    "read_semantic_lidar": "lidar.read",
     "simulate": "pipeline",
     "simulate_all": "pipeline",
     "synthesize": "synthesis",

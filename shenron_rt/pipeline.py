@@ -1,8 +1,9 @@
-"""The whole chain in one call: scene to detections."""
+"""The whole chain in one call: a scene, or a LiDAR frame, to detections."""
 
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from .config.scene import RadarMount, Scene
 from .dsp import Detections, RadarCube, detect, process
 from .errors import InputError
 from .frames import Pose
+from .lidar.door import lidar_scatterers
+from .lidar.frame import LidarFrame
 from .returns import Returns, illuminate
 from .scatterers import Scatterers
 from .synthesis import AdcCube, synthesize
@@ -60,7 +63,7 @@ class Frame:
 
 
 def simulate(
-    source: Scene,
+    source: Scene | LidarFrame,
     profile: RadarProfile | None = None,
     *,
     radar: str | None = None,
@@ -79,15 +82,16 @@ def simulate(
 
     Parameters
     ----------
-    source : Scene
+    source : Scene or LidarFrame
+        Of a LiDAR frame the points are the scatterers; nothing is traced.
     profile : RadarProfile, optional
-        Replaces the radar's profile and keeps its mount.
+        Replaces the radar's profile and keeps its mount. A LiDAR frame needs one.
     radar : str, optional
-        Which radar; needed where the scene has several.
+        Which radar; needed where the scene has several. With a LiDAR frame: a name for it, by default the profile's.
     time : float
         Scene seconds at the first chirp's start [s].
     seed : int, optional
-        Default: the scene's.
+        Default: the scene's; 0 for a LiDAR frame.
     frame : int
         Frame index; random numbers derive from (seed, frame, radar).
     rays, max_bounces, backend
@@ -97,7 +101,7 @@ def simulate(
     noise : str or None
         ``"thermal"``, or ``None`` for none.
     mount : Pose, optional
-        Replaces the radar's pose in the ego frame.
+        Replaces the radar's pose in the ego frame. With a LiDAR frame: default (2, 0, 1) m; needs its ``sensor_pose``.
     accuracy : float
         Of the ADC synthesis, relative to the RMS of the noise-free cube.
 
@@ -108,7 +112,7 @@ def simulate(
     Raises
     ------
     InputError
-        Several radars and none named, or what the stages raise.
+        Several radars and none named, a LiDAR frame without a profile, or what the stages raise.
 
     Examples
     --------
@@ -116,8 +120,16 @@ def simulate(
     >>> scene = srt.Scene(point_targets=[{"id": 1, "xyz_m": (30, 0, 1), "rcs_dbsm": 10}])
     >>> frame = srt.simulate(scene)  # doctest: +SKIP
     """
+    if isinstance(source, LidarFrame):
+        if profile is None:
+            raise InputError(
+                "simulate: a LiDAR frame has no radar; give a profile, load_profile('awrl1432') for example"
+            )
+        name = radar or profile.name
+        scatterers = lidar_scatterers(source, profile, mount, radar=name, seed=seed or 0, index=frame)
+        return _processed(scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy)
     if not isinstance(source, Scene):
-        raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}")
+        raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}; a LidarFrame is taken too")
     place = source.radar(radar)
     if mount is not None:
         place = place.model_copy(update={"xyz_m": mount.xyz, "ypr_deg": mount.ypr_deg})
@@ -134,8 +146,23 @@ def simulate(
         max_bounces=max_bounces,
         backend=backend,
     )
-    returns = illuminate(scatterers, used, model=model, materials=source.materials)
-    adc = synthesize(returns, used, noise=noise, seed=scatterers.seed, frame=frame, accuracy=accuracy, radar=place.name)
+    return _processed(scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy)
+
+
+def _processed(
+    scatterers: Scatterers,
+    used: RadarProfile,
+    materials: str | os.PathLike[str],
+    *,
+    time: float,
+    model: str,
+    noise: str | None,
+    accuracy: float,
+) -> Frame:
+    """Run the chain from scatterers on; it is the same behind both doors."""
+    seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
+    returns = illuminate(scatterers, used, model=model, materials=materials)
+    adc = synthesize(returns, used, noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
     detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
@@ -146,9 +173,9 @@ def simulate(
         cube=cube,
         detections=detections,
         profile=used,
-        seed=scatterers.seed,
+        seed=seed,
         backend=scatterers.backend,
-        radar=place.name,
+        radar=radar,
         time=time,
         frame=frame,
     )
