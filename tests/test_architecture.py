@@ -25,8 +25,9 @@ LAYERS = (
     ("returns", "echo"),
     ("synthesis",),
     ("dsp",),
-    ("io", "pipeline"),
+    ("io", "pipeline", "cshenron"),
     ("runs",),
+    ("comparison",),
     ("plot", "report"),
     ("cli",),
 )
