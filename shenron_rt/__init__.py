@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from .synthesis import synthesize as synthesize
     from .tags import SemanticTag as SemanticTag
     from .tracing import trace as trace
+    from .tracing.lidar import cast_lidar as cast_lidar
 
 _HOME = {
     "AdcCube": "synthesis",
@@ -63,6 +64,7 @@ _HOME = {
     "SemanticTag": "tags",
     "ShenronError": "errors",
     "TaggedMesh": "scene.mesh",
+    "cast_lidar": "tracing.lidar",
     "detect": "dsp",
     "illuminate": "returns",
     "load_materials": "config.materials",

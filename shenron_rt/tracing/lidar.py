@@ -21,7 +21,7 @@ from .backend import choose_backend
 from .launch import Cells
 from .trace import Columns, _aims, _cast, _launch_pattern, _prepared, _rows
 
-__all__ = ["ScanPattern", "cast_at_radar", "cast_lidar", "scan_pattern"]
+__all__ = ["ScanPattern", "cast_at_radar", "cast_lidar", "lidar_of", "scan_pattern"]
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def cast_lidar(
     >>> scene = srt.load_scene("braking")
     >>> points = srt.cast_lidar(scene, LidarMount(xyz_m=(0, 0, 2.5), range_m=80))  # doctest: +SKIP
     """
-    mount = _mount(scene, lidar)
+    mount = lidar_of(scene, lidar)
     if not 0 <= dropoff <= 1:
         raise InputError(f"dropoff: a share from 0 to 1 is needed, got {dropoff}")
     if not (math.isfinite(noise_stddev_m) and noise_stddev_m >= 0):
@@ -210,7 +210,14 @@ def cast_at_radar(
     return _frame(scene, world, columns, grid, mount.pose, instant, surface=surface)
 
 
-def _mount(scene: Scene, lidar: str | LidarMount | None) -> LidarMount:
+def lidar_of(scene: Scene, lidar: str | LidarMount | None = None) -> LidarMount:
+    """Return the scene's LiDAR of that name, or its only one; one of your own is passed on.
+
+    Raises
+    ------
+    InputError
+        No such LiDAR, none at all, or several and no name.
+    """
     if isinstance(lidar, LidarMount):
         return lidar
     names = [m.name for m in scene.lidars]
