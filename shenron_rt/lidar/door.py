@@ -114,6 +114,8 @@ def lidar_scatterers(
         area=frame.area,
         velocity=velocity,
         normal=normal,
+        material=frame.material,
+        material_names=frame.material_names,
         radar=radar or ("" if profile is None else profile.name),
         seed=seed,
         frame=index,

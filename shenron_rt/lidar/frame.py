@@ -48,6 +48,10 @@ class LidarFrame:
         The recorded velocity column, relative to the sensor, positive = receding [m/s].
     normal : (n, 3) float or None
         Unit normals facing the sensor, estimated on demand; 0 0 0 where none could be.
+    material : (n,) uint16 or None
+        Index into ``material_names``; only frames cast over a scene can have it. ``None`` leaves it to the tags.
+    material_names : tuple of str
+        Names in the material table.
     path, layout, tag_table : str
         Where the points came from, how they were stored, how their tags were numbered.
     names : mapping of int to str
@@ -70,6 +74,8 @@ class LidarFrame:
     ego_yaw_rate: float = 0.0
     range_rate: FloatArray | None = None
     normal: FloatArray | None = None
+    material: IntArray | None = None
+    material_names: tuple[str, ...] = ()
     path: str = ""
     layout: str = ""
     tag_table: str = ""
@@ -82,7 +88,7 @@ class LidarFrame:
         n = len(self.position)
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "cos_incidence": (n,), "object_id": (n,), "tag": (n,), "area": (n,),
-            "velocity": (n, 3), "range_rate": (n,), "normal": (n, 3),
+            "velocity": (n, 3), "range_rate": (n,), "normal": (n, 3), "material": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -112,13 +118,17 @@ class LidarFrame:
         }
         return replace(self, **picked, notes=(*self.notes, note) if note else self.notes)
 
-    def with_normals(self, *, neighbours: int = 12, max_error: float = 0.1) -> Self:
+    def with_normals(self, *, neighbours: int = 8, flatness: float = 0.2) -> Self:
         """Return the frame with normals estimated from neighbouring points; see :func:`estimate_normals`."""
         from .normals import estimate_normals
 
-        normal = estimate_normals(self, neighbours=neighbours, max_error=max_error)
+        normal = estimate_normals(self, neighbours=neighbours, flatness=flatness)
         found = int(np.any(normal != 0, axis=1).sum())
         return replace(self, normal=normal, notes=(*self.notes, f"normals estimated for {found} of {len(self)} points"))
+
+    def without_normals(self) -> Self:
+        """Return the frame with "none" for every normal, so that the recorded cosines are used everywhere."""
+        return replace(self, normal=np.zeros_like(self.position), notes=(*self.notes, "no normals, as asked"))
 
     def crop_ego(
         self, length_m: float = 5.0, width_m: float = 2.2, height_m: float = 2.0, *, center_x_m: float = 0.0
@@ -179,6 +189,7 @@ class LidarFrame:
         arrays["sensor_pose"] = None if pose is None else np.array([*pose.xyz, *pose.ypr_deg])
         arrays["names"] = np.array([f"{k}={v}" for k, v in self.names.items()], dtype=str)
         arrays["notes"] = np.array(self.notes, dtype=str)
+        arrays["material_names"] = np.array(self.material_names, dtype=str)
         save_npz(path, arrays)
 
     @classmethod
@@ -200,6 +211,7 @@ class LidarFrame:
         pairs = (str(item).partition("=") for item in arrays.get("names", ()))
         values["names"] = {int(k): v for k, _, v in pairs}
         values["notes"] = tuple(str(v) for v in arrays.get("notes", ()))
+        values["material_names"] = tuple(str(v) for v in arrays.get("material_names", ()))
         for name, kind in (("path", str), ("layout", str), ("tag_table", str), ("n_read", int), ("n_clipped", int)):
             values[name] = kind(arrays[name]) if name in arrays else kind()
         values["ego_yaw_rate"] = float(arrays.get("ego_yaw_rate", 0.0))

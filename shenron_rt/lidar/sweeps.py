@@ -33,11 +33,11 @@ def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_
     Raises
     ------
     InputError
-        Sensor poses that differ; velocity, recorded column or normals in one sweep only.
+        Sensor poses that differ; velocity, recorded column, normals or materials in one sweep only.
     """
     if now.sensor_pose != earlier.sensor_pose:
         raise InputError(f"merge_sweeps: sensor poses differ: {now.sensor_pose} and {earlier.sensor_pose}")
-    for name in ("velocity", "range_rate", "normal"):
+    for name in ("velocity", "range_rate", "normal", "material"):
         if (getattr(now, name) is None) != (getattr(earlier, name) is None):
             raise InputError(f"merge_sweeps: only one of the sweeps has {name}; read both the same way")
     mount = now.sensor_pose or Pose()
@@ -51,7 +51,7 @@ def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_
         joined["velocity"] = np.concatenate([now.velocity, velocity])
     if now.normal is not None and earlier.normal is not None:
         joined["normal"] = np.concatenate([now.normal, _turned(earlier.normal, turn)])
-    for name in ("cos_incidence", "object_id", "tag", "area", "range_rate"):
+    for name in ("cos_incidence", "object_id", "tag", "area", "range_rate", "material"):
         if getattr(now, name) is not None:
             joined[name] = np.concatenate([getattr(now, name), getattr(earlier, name)])
     shift = float(np.linalg.norm(motion.translation))

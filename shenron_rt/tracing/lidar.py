@@ -92,7 +92,8 @@ def cast_lidar(
     frame: int = 0,
     dropoff: float = 0.0,
     noise_stddev_m: float = 0.0,
-    surface: bool = False,
+    normals: bool = False,
+    materials: bool = False,
     backend: str = "auto",
 ) -> LidarFrame:
     """Cast a semantic LiDAR over a scene, as CARLA's ``sensor.lidar.ray_cast_semantic`` would.
@@ -115,9 +116,10 @@ def cast_lidar(
         Share of points that are lost at random, 0 to 1. CARLA's semantic LiDAR loses none.
     noise_stddev_m : float
         Standard deviation of the range [m]. CARLA's semantic LiDAR has none.
-    surface : bool
-        Carry along what no LiDAR knows: the true normal and the material of each point, so that the two doors differ
-        in nothing but their rays.
+    normals : bool
+        Carry along the true normal of each point, which no LiDAR knows.
+    materials : bool
+        Carry along the material of each point: the mesh door knows one for every part, a LiDAR nothing but its tag.
     backend : str
         ``"auto"``, ``"cuda"``, ``"llvm"`` or ``"scalar"``.
 
@@ -165,7 +167,7 @@ def cast_lidar(
         far = distance[kept]
         moved = np.maximum(far + generator.normal(0.0, noise_stddev_m, len(far)), 0.0)
         columns["position"] = columns["position"] * (moved / far)[:, None]
-    return _frame(scene, world, columns, pattern.grid, mount.pose, time, surface=surface)
+    return _frame(scene, world, columns, pattern.grid, mount.pose, time, normals=normals, materials=materials)
 
 
 def cast_at_radar(
@@ -177,7 +179,8 @@ def cast_at_radar(
     seed: int | None = None,
     frame: int = 0,
     rays: int = 300_000,
-    surface: bool = False,
+    normals: bool = False,
+    materials: bool = False,
     backend: str = "auto",
 ) -> LidarFrame:
     """Cast the rays of :func:`shenron_rt.trace`, from the radar, as a LiDAR: a check of the doors against each other.
@@ -186,7 +189,7 @@ def cast_at_radar(
     ----------
     scene, profile, radar, time, seed, frame, rays, backend
         As for :func:`shenron_rt.trace`; the poses are those of the radar's mid-frame.
-    surface : bool
+    normals, materials : bool
         As for :func:`cast_lidar`.
 
     Returns
@@ -207,7 +210,7 @@ def cast_at_radar(
     # a cube map has no azimuth step; its spacing stands for both
     step = float(np.degrees(launches[0].cells.spacing))
     grid = LidarGrid(max(2, round(180 / step)), 90.0, -90.0, step)
-    return _frame(scene, world, columns, grid, mount.pose, instant, surface=surface)
+    return _frame(scene, world, columns, grid, mount.pose, instant, normals=normals, materials=materials)
 
 
 def lidar_of(scene: Scene, lidar: str | LidarMount | None = None) -> LidarMount:
@@ -258,7 +261,15 @@ def _over_ground(columns: Columns, eye: BodyState) -> FloatArray:
 
 
 def _frame(
-    scene: Scene, world: World, columns: Columns, grid: LidarGrid, pose: Pose, time: float, *, surface: bool
+    scene: Scene,
+    world: World,
+    columns: Columns,
+    grid: LidarGrid,
+    pose: Pose,
+    time: float,
+    *,
+    normals: bool,
+    materials: bool,
 ) -> LidarFrame:
     ego = body_state(scene.ego.pose, scene.ego.velocity_mps, scene.ego.yaw_rate_deg_s, time)
     return LidarFrame(
@@ -272,7 +283,9 @@ def _frame(
         velocity=_over_ground(columns, world.radar_state),
         ego_velocity=ego.rotation.T @ ego.velocity,
         ego_yaw_rate=ego.yaw_rate,
-        normal=columns["normal"] if surface else None,
+        normal=columns["normal"] if normals else None,
+        material=columns["material"] if materials else None,
+        material_names=tuple(world.materials.materials) if materials else (),
         path=scene.name,
         layout="cast over a mesh scene",
         tag_table="0.9.14",
