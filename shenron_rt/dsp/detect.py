@@ -299,12 +299,14 @@ def _snr_db(cube: RadarCube, peaks: _Peaks) -> FloatArray:
 def _rcs_dbsm(
     cube: RadarCube, power: FloatArray, distance: FloatArray, azimuth: FloatArray, elevation: FloatArray
 ) -> FloatArray:
-    """Invert the radar equation at the estimated range and direction, pattern and radome loss removed."""
+    """Invert the radar equation at the estimated range and direction, without pattern, radome and weather loss."""
     p = cube.profile
     pattern = np.asarray(p.pattern(azimuth, elevation), dtype=np.float64)
     gain_tx, gain_rx, loss = (
         10 ** (level / 10) for level in (p.antenna.gain_tx_dbi, p.antenna.gain_rx_dbi, p.antenna.radome_loss_db)
     )
+    if cube.weather is not None:
+        loss = loss * cube.weather.two_way_loss(distance, p.center_hz, p.antenna.polarization)
     # behind a pattern's null no cross section can be told: keep the ratio finite
     seen = np.maximum(pattern, _PATTERN_FLOOR)
     area = rcs_from_power(power, distance, p.wavelength_m, p.tx_power_w, gain_tx * seen, gain_rx * seen, loss)
