@@ -83,6 +83,8 @@ class Scatterers:
         Velocity relative to the radar, in its (turning) frame [m/s].
     normal : (n, 3) float or None
         Unit normal facing the radar.
+    slope : (n,) float or None
+        RMS slope of the surface about ``normal`` across the row, as a tangent; for rows without footprint.
     material : (n,) uint16 or None
         Index into ``material_names``.
     material_names : tuple of str
@@ -123,6 +125,7 @@ class Scatterers:
     area: FloatArray | None = None
     velocity: FloatArray | None = None
     normal: FloatArray | None = None
+    slope: FloatArray | None = None
     material: IntArray | None = None
     material_names: tuple[str, ...] = ()
     footprint: FloatArray | None = None
@@ -142,7 +145,7 @@ class Scatterers:
         n = len(self.position)
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "range_rate": (n,), "cos_incidence": (n,), "object_id": (n,), "tag": (n,),
-            "area": (n,), "velocity": (n, 3), "normal": (n, 3), "material": (n,), "footprint": (n, 2, 3),
+            "area": (n,), "velocity": (n, 3), "normal": (n, 3), "slope": (n,), "material": (n,), "footprint": (n, 2, 3),
             "joined": (n, 4), "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():

@@ -2,6 +2,8 @@
 
 Every tube has a coherent part, the physical-optics integral over its footprint weakened by roughness, and an
 incoherent part, sigma0 times area with exponentially distributed power. Point targets have the RCS they were given.
+Points without footprints, those of a LiDAR, have no coherent part; where they have normals, its power is that of
+geometric optics, with a random phase.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from ..physics.fresnel import backscatter_reflection
 from ..randomness import frame_generator
 from ..returns import Returns
 from ..scatterers import Scatterers
+from .glint import glint_sigma0
 from .link import link_amplitude
 
 if TYPE_CHECKING:
@@ -244,9 +247,15 @@ def _coherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Cu
 def _incoherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Curves, profile: RadarProfile) -> _Echo:
     assert scatterers.area is not None
     assert scatterers.speckle is not None
-    lit = np.flatnonzero(curves.sigma0 > 0)
+    sigma0 = curves.sigma0
+    if scatterers.footprint is None and scatterers.normal is not None:  # points of a LiDAR: no tubes to integrate over
+        height_phase = 2.0 * math.pi * profile.center_hz / SPEED_OF_LIGHT * curves.roughness_m
+        geometry = (scatterers.normal[rows], light.direction[rows], height_phase)
+        spread = None if scatterers.slope is None else scatterers.slope[rows]
+        sigma0 = sigma0 + glint_sigma0(curves.te, curves.tm, *geometry, profile.antenna.polarization, spread)
+    lit = np.flatnonzero(sigma0 > 0)
     source = rows[lit]
-    root = np.sqrt(curves.sigma0[lit] * scatterers.area[source])
+    root = np.sqrt(sigma0[lit] * scatterers.area[source])
     scale = light.link[source] * (profile.wavelength_m / math.sqrt(FOUR_PI_CUBED)) * root / light.distance[source] ** 2
     return _Echo(scale * scatterers.speckle[source], _jittered(scatterers, source, light), source, False)
 

@@ -114,6 +114,7 @@ def lidar_scatterers(
         area=frame.area,
         velocity=velocity,
         normal=normal,
+        slope=frame.slope,
         material=frame.material,
         material_names=frame.material_names,
         radar=radar or ("" if profile is None else profile.name),

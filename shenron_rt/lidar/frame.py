@@ -48,6 +48,8 @@ class LidarFrame:
         The recorded velocity column, relative to the sensor, positive = receding [m/s].
     normal : (n, 3) float or None
         Unit normals facing the sensor, estimated on demand; 0 0 0 where none could be.
+    slope : (n,) float or None
+        RMS slope of the surface between a point and its neighbours, as a tangent; comes with ``normal``.
     material : (n,) uint16 or None
         Index into ``material_names``; only frames cast over a scene can have it. ``None`` leaves it to the tags.
     material_names : tuple of str
@@ -74,6 +76,7 @@ class LidarFrame:
     ego_yaw_rate: float = 0.0
     range_rate: FloatArray | None = None
     normal: FloatArray | None = None
+    slope: FloatArray | None = None
     material: IntArray | None = None
     material_names: tuple[str, ...] = ()
     path: str = ""
@@ -88,7 +91,7 @@ class LidarFrame:
         n = len(self.position)
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "cos_incidence": (n,), "object_id": (n,), "tag": (n,), "area": (n,),
-            "velocity": (n, 3), "range_rate": (n,), "normal": (n, 3), "material": (n,),
+            "velocity": (n, 3), "range_rate": (n,), "normal": (n, 3), "slope": (n,), "material": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -122,13 +125,23 @@ class LidarFrame:
         """Return the frame with normals estimated from neighbouring points; see :func:`estimate_normals`."""
         from .normals import estimate_normals
 
-        normal = estimate_normals(self, neighbours=neighbours, flatness=flatness)
+        normal, slope = estimate_normals(self, neighbours=neighbours, flatness=flatness)
         found = int(np.any(normal != 0, axis=1).sum())
-        return replace(self, normal=normal, notes=(*self.notes, f"normals estimated for {found} of {len(self)} points"))
+        return replace(
+            self,
+            normal=normal,
+            slope=slope,
+            notes=(*self.notes, f"normals estimated for {found} of {len(self)} points"),
+        )
 
     def without_normals(self) -> Self:
         """Return the frame with "none" for every normal, so that the recorded cosines are used everywhere."""
-        return replace(self, normal=np.zeros_like(self.position), notes=(*self.notes, "no normals, as asked"))
+        return replace(
+            self,
+            normal=np.zeros_like(self.position),
+            slope=np.zeros(len(self)),
+            notes=(*self.notes, "no normals, as asked"),
+        )
 
     def crop_ego(
         self, length_m: float = 5.0, width_m: float = 2.2, height_m: float = 2.0, *, center_x_m: float = 0.0

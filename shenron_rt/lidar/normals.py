@@ -1,4 +1,4 @@
-"""Normals of a LiDAR frame: planes through neighbouring points, held against the cosine the sensor recorded."""
+"""Normals of a LiDAR frame: planes through neighbouring points, tilted as the sensor recorded."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..errors import InputError
 from ..frames import spherical
 
@@ -15,63 +15,121 @@ if TYPE_CHECKING:
 
 __all__ = ["estimate_normals"]
 
-#: Neighbours further off than this many cells of the sensor's grid belong to other surfaces.
-_REACH_CELLS = 3.5
-_FEWEST = 5
-#: RMS distance from the plane over the RMS width of the neighbourhood.
-_FLATNESS = 0.1
+#: Neighbours further off than this many cells of the sensor's grid say nothing of the surface here.
+_REACH_CELLS = 3.0
+#: Neighbours whose recorded cosine differs by this much count 1/e: they lie on another facet.
+_COSINE_WIDTH = 0.15
+_FEWEST = 3
 #: Neighbourhoods narrower than this are lines: LAZ rounds to 1 mm [m].
-_WIDTH_M = 0.01
+_WIDTH_M = 0.005
+#: Directions around the line of sight that are tried; a parabola through the best three refines it.
+_TURNS = 48
 
 
-def estimate_normals(frame: LidarFrame, *, neighbours: int = 12, max_error: float = 0.1) -> FloatArray:
-    """Fit a plane to the neighbours of every point that have its object id and tag.
+def estimate_normals(frame: LidarFrame, *, neighbours: int = 8, flatness: float = 0.2) -> tuple[FloatArray, FloatArray]:
+    """Fit a plane to the neighbours of every point, at the angle of incidence that the sensor recorded.
 
     Parameters
     ----------
     frame : LidarFrame
     neighbours : int
         Nearest points, by cells of the sensor's grid and not by metres: on a road 20 m away two channels lie metres
-        apart and two azimuths centimetres, and the nearest in metres are a line.
-    max_error : float
-        Largest difference between -u.n and the recorded cosine at which a normal is kept.
+        apart and two azimuths centimetres, and the nearest in metres are a line. Only those with the same object id
+        and tag count.
+    flatness : float
+        Largest RMS distance of the neighbours from the plane, over the width of the neighbourhood.
 
     Returns
     -------
-    (n, 3) float
-        Unit normals facing the sensor, in the frame's axes; 0 0 0 where the neighbours are too few, lie on a line, are
-        not flat, or contradict the recorded cosine.
+    normal : (n, 3) float
+        Unit normals facing the sensor, in the frame's axes; 0 0 0 where the neighbours are fewer than three, lie on a
+        line, or are not flat.
+    slope : (n,) float
+        Half the RMS turn of the normal to the neighbouring points: the slopes that lie between the samples.
 
     Raises
     ------
     InputError
-        Fewer than five neighbours asked for.
+        Fewer than three neighbours asked for.
+
+    Notes
+    -----
+    With c the recorded cosine and u the line of sight, n = -c u + sqrt(1 - c^2) (e1 cos phi + e2 sin phi): only phi is
+    free, and is where sum w (n . d)^2 over the offsets d to the neighbours is least.
     """
     if neighbours < _FEWEST:
         raise InputError(f"estimate_normals: neighbours >= {_FEWEST} are needed for a plane, got {neighbours}")
     if len(frame) <= neighbours:
-        return np.zeros((len(frame), 3))
+        return np.zeros((len(frame), 3)), np.zeros(len(frame))
+    from .._parallel import map_blocks
+
+    index, weight = _neighbours(frame, neighbours)
+    blocks = map_blocks(lambda rows: _fit(frame, rows, index[rows], weight[rows], flatness), len(frame))
+    normal = np.concatenate(blocks)
+    return normal, _slope(normal, index, weight)
+
+
+def _slope(normal: FloatArray, index: IntArray, weight: FloatArray) -> FloatArray:
+    known = np.any(normal != 0, axis=1)
+    w = np.where(known[:, None] & known[index], weight, 0.0)
+    turn = np.sum((normal[index] - normal[:, None]) ** 2, axis=2)
+    mean = (w * turn).sum(axis=1) / np.maximum(w.sum(axis=1), 1e-12)
+    slope: FloatArray = 0.5 * np.sqrt(mean)
+    return slope
+
+
+def _neighbours(frame: LidarFrame, count: int) -> tuple[IntArray, FloatArray]:
+    """Return (n, count) indices of neighbours and their weights; 0 is not of this surface."""
     from scipy.spatial import cKDTree
 
     cells = _cells(frame)
-    reach, index = cKDTree(cells).query(cells, k=neighbours + 1)
+    reach, index = cKDTree(cells).query(cells, k=count + 1, workers=2)
+    reach, index = reach[:, 1:], index[:, 1:]
     same = (frame.object_id[index] == frame.object_id[:, None]) & (frame.tag[index] == frame.tag[:, None])
-    weight = np.where(same & (reach < _REACH_CELLS), 1.0, 0.0)
-    count = weight.sum(axis=1)
-    points = frame.position[index]
-    mean = np.einsum("nk,nki->ni", weight, points) / count[:, None]
-    off = (points - mean[:, None]) * weight[..., None]
-    covariance = np.einsum("nki,nkj->nij", off, off) / count[:, None, None]
-    variance, axes = np.linalg.eigh(covariance)
-    normal: FloatArray = axes[:, :, 0]
-    u = frame.position / np.maximum(np.linalg.norm(frame.position, axis=1), 1e-9)[:, None]
-    along = np.einsum("ij,ij->i", normal, u)
-    normal = normal * np.where(along > 0, -1.0, 1.0)[:, None]
-    width = np.sqrt(np.maximum(variance[:, 1], 0.0))
-    flat = np.sqrt(np.maximum(variance[:, 0], 0.0)) < _FLATNESS * width
-    agrees = np.abs(np.abs(along) - frame.cos_incidence) <= max_error
-    kept = (count >= _FEWEST) & (width > _WIDTH_M) & flat & agrees
+    change = (frame.cos_incidence[index] - frame.cos_incidence[:, None]) / _COSINE_WIDTH
+    near = same & (reach < _REACH_CELLS)
+    return index, np.where(near, np.exp(-(change**2)) / (1.0 + reach**2), 0.0)
+
+
+def _fit(frame: LidarFrame, rows: slice, index: IntArray, weight: FloatArray, flatness: float) -> FloatArray:
+    point = frame.position[rows]
+    u = point / np.maximum(np.linalg.norm(point, axis=1), 1e-9)[:, None]
+    e1 = np.cross(u, np.where(np.abs(u[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    e1 /= np.linalg.norm(e1, axis=1)[:, None]
+    e2 = np.cross(u, e1)
+    offset = frame.position[index] - point[:, None]
+    # near and far neighbours say the same of a direction: scaled by length, else the longest alone decides
+    size = np.maximum(np.linalg.norm(offset, axis=2), 1e-9)
+    total = np.maximum(weight.sum(axis=1), 1e-9)
+    tangent = offset / size[..., None] * np.sqrt(weight / total[:, None])[..., None]
+    spread = np.einsum("nki,nkj->nij", tangent, tangent)
+    c = frame.cos_incidence[rows, None]
+    s = np.sqrt(np.maximum(1.0 - c**2, 0.0))
+
+    def normal_at(phi: FloatArray) -> FloatArray:
+        n: FloatArray = -c * u + s * (e1 * np.cos(phi)[:, None] + e2 * np.sin(phi)[:, None])
+        return n
+
+    def misfit(n: FloatArray) -> FloatArray:
+        return np.einsum("ni,nij,nj->n", n, spread, n)
+
+    angles = np.arange(_TURNS) * (2.0 * np.pi / _TURNS)
+    cost = np.stack([misfit(normal_at(np.full(len(point), a))) for a in angles], axis=1)
+    normal = normal_at(_refined(cost, angles))
+    width = np.sqrt(np.maximum(np.linalg.eigvalsh(spread)[:, 1], 0.0))
+    wide = width * (size * weight).sum(axis=1) / total > _WIDTH_M
+    kept = (np.count_nonzero(weight > 1e-3, axis=1) >= _FEWEST) & wide & (width > 0.05)
+    kept &= np.sqrt(np.maximum(misfit(normal), 0.0)) < flatness
     return np.where(kept[:, None], normal, 0.0)
+
+
+def _refined(cost: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return the angle of the least cost, by a parabola through the best three."""
+    row, best = np.arange(len(cost)), np.argmin(cost, axis=1)
+    before, here, after = (cost[row, (best + k) % cost.shape[1]] for k in (-1, 0, 1))
+    curve = before - 2.0 * here + after
+    shift = np.divide(0.5 * (before - after), curve, out=np.zeros_like(curve), where=curve > 1e-15)
+    return angles[best] + np.clip(shift, -0.5, 0.5) * (angles[1] - angles[0])
 
 
 def _cells(frame: LidarFrame) -> FloatArray:

@@ -37,7 +37,7 @@ def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_
     """
     if now.sensor_pose != earlier.sensor_pose:
         raise InputError(f"merge_sweeps: sensor poses differ: {now.sensor_pose} and {earlier.sensor_pose}")
-    for name in ("velocity", "range_rate", "normal", "material"):
+    for name in ("velocity", "range_rate", "normal", "slope", "material"):
         if (getattr(now, name) is None) != (getattr(earlier, name) is None):
             raise InputError(f"merge_sweeps: only one of the sweeps has {name}; read both the same way")
     mount = now.sensor_pose or Pose()
@@ -51,7 +51,7 @@ def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_
         joined["velocity"] = np.concatenate([now.velocity, velocity])
     if now.normal is not None and earlier.normal is not None:
         joined["normal"] = np.concatenate([now.normal, _turned(earlier.normal, turn)])
-    for name in ("cos_incidence", "object_id", "tag", "area", "range_rate", "material"):
+    for name in ("cos_incidence", "object_id", "tag", "area", "range_rate", "slope", "material"):
         if getattr(now, name) is not None:
             joined[name] = np.concatenate([getattr(now, name), getattr(earlier, name)])
     shift = float(np.linalg.norm(motion.translation))
