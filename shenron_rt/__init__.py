@@ -10,6 +10,8 @@ import importlib.metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .comparison import Comparison as Comparison
+    from .comparison import compare as compare
     from .config.materials import Material as Material
     from .config.materials import MaterialTable as MaterialTable
     from .config.materials import load_materials as load_materials
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 _HOME = {
     "AdcCube": "synthesis",
     "BackendError": "errors",
+    "Comparison": "comparison",
     "ConfigError": "errors",
     "Detections": "dsp",
     "Frame": "pipeline",
@@ -65,6 +68,7 @@ _HOME = {
     "ShenronError": "errors",
     "TaggedMesh": "scene.mesh",
     "cast_lidar": "tracing.lidar",
+    "compare": "comparison",
     "detect": "dsp",
     "illuminate": "returns",
     "load_materials": "config.materials",

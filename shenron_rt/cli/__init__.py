@@ -16,6 +16,7 @@ _VERBS = {
     "run": ("run:run", "Render a mesh scene: scatterers, ADC cube, maps, detections, pictures."),
     "process": ("process:process", "Process ADC data: own cubes, plain .npy arrays, DCA1000 captures."),
     "cast-lidar": ("cast:cast_lidar", "Cast a semantic LiDAR over a mesh scene and write CARLA's files."),
+    "compare": ("compare:compare", "Compare two runs, or a run and a recording, and say what makes them differ."),
     "resolve": ("resolve:resolve", "Show which tag every part of a mesh gets, by which rule."),
     "validate": ("validate:validate", "Check YAML, mesh and ADC files and run folders."),
     "profiles": ("tables:profiles", "List the radar profiles, or show one with its derived numbers and sources."),

@@ -1,0 +1,314 @@
+"""What an object's power is made of: a difference of two powers splits into causes without a rest.
+
+For the rows i of an object, with area A, backscatter s, distance R and link L = Pt Gt Gr / losses, the power expected
+is
+    E = lambda^2 / (4 pi)^3 * sum A_i s_i L_i / R_i^4,
+
+and the power received is P; C is what its coherent echoes add up to. In dB, from side A to side B,
+
+    10 log10(P_B / P_A) = coverage + incidence + material + surfaces + range + beam + profile + weather
+                          + coherent + speckle
+
+where each term changes one factor: the area; the cosines at which it is seen; what it is made of; which materials lie
+at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
+(E + C) / E; and what remains, P / (E + C), the draw of the speckle. With other echo models than ``physical`` the last
+two are one term, model.
+Points of given RCS count with area = RCS and s = 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._typing import BoolArray, FloatArray, IntArray
+from ..constants import FOUR_PI_CUBED
+from ..echo.link import link_amplitude
+from ..scatterers import Scatterers
+from .sides import Side
+
+if TYPE_CHECKING:
+    from ..config.profile import RadarProfile
+    from ..returns import Returns
+
+__all__ = ["Budget", "Grouping", "Palette", "budget_of", "received", "terms_db"]
+
+_POINT = "(given RCS)"
+_GRID = np.linspace(0.0, 1.0, 1025)
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Rows to groups: by object, or by tag.
+
+    Parameters
+    ----------
+    keys : (g,) int
+        Ascending.
+    by : str
+        ``"object_id"`` or ``"tag"``.
+    """
+
+    keys: IntArray
+    by: str
+
+    def index(self, source: Scatterers | Returns) -> IntArray:
+        """Return the group of every row."""
+        keys: IntArray = getattr(source, self.by)
+        return np.asarray(np.searchsorted(self.keys, keys.astype(np.int64)))
+
+    def sum(self, index: IntArray, weight: FloatArray) -> FloatArray:
+        """Return (g,) sums over the rows."""
+        return np.asarray(np.bincount(index, weight, len(self.keys)), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Sums over the rows of each group, (g,) each, of one side.
+
+    Parameters
+    ----------
+    rows : int
+    area, backscatter, spread, patterned, profiled, expected : float
+        sum A; sum A s; sum A s / R^4; with the pattern of the common profile; of the own; with the weather [W].
+    fluctuation_db : float
+        Standard deviation of the level that speckle gives.
+    mean_range, cosine : float
+        Weighted by backscatter, and by area.
+    shares : dict of str to (g,) float
+        Area share of each material.
+    curves : dict of str to (g,) float
+        Mean sigma0 of each material over the group's cosines, whatever the group is made of.
+    """
+
+    rows: IntArray
+    area: FloatArray
+    backscatter: FloatArray
+    spread: FloatArray
+    patterned: FloatArray
+    profiled: FloatArray
+    expected: FloatArray
+    fluctuation_db: FloatArray
+    mean_range: FloatArray
+    cosine: FloatArray
+    shares: dict[str, FloatArray]
+    curves: dict[str, FloatArray]
+
+
+def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping) -> tuple[FloatArray, FloatArray]:
+    """Return (g,) received power and (g,) power of the coherent surface echoes alone [W].
+
+    Coherent echoes of one object add as phasors, as in :meth:`shenron_rt.Returns.power_by_object`; objects in power.
+    """
+    phasor = returns.amplitude * np.exp(2j * np.pi * returns.center_hz * returns.delay_s)
+    given = np.zeros(len(returns), dtype=bool)
+    if scatterers is not None and scatterers.rcs is not None:
+        given = ~np.isnan(scatterers.rcs[returns.scatterer])
+    pair = (returns.object_id.astype(np.int64) << 8) | (returns.tag if grouping.by == "tag" else 0)
+    pairs, first, row = np.unique(pair, return_index=True, return_inverse=True)
+    group = grouping.index(returns)[first]
+
+    def coherent_power(rows: BoolArray) -> FloatArray:
+        kept = np.where(rows, phasor, 0.0)
+        re, im = np.bincount(row, kept.real, len(pairs)), np.bincount(row, kept.imag, len(pairs))
+        return grouping.sum(group, np.asarray(re**2 + im**2, dtype=np.float64))
+
+    speckle = grouping.sum(grouping.index(returns), np.where(returns.coherent, 0.0, np.abs(returns.amplitude) ** 2))
+    return coherent_power(returns.coherent) + speckle, coherent_power(returns.coherent & ~given)
+
+
+@dataclass(frozen=True)
+class Palette:
+    """The materials of both sides, so that either side's can be looked at from the other's angles.
+
+    Parameters
+    ----------
+    curves : dict of str to (k,) float
+        sigma0 over a grid of cosines.
+    of_a, of_b : dict of str to str
+        Material name -> key of ``curves``.
+    """
+
+    curves: dict[str, FloatArray]
+    of_a: dict[str, str]
+    of_b: dict[str, str]
+
+    @classmethod
+    def of(cls, a: Side, b: Side) -> Palette:
+        """Return the materials that lie on either side's rows; one name with two meanings gets two keys."""
+        curves_a = {name: _sigma0_grid(a, name) for name in _used(a)}
+        curves = dict(curves_a)
+        of_b = {}
+        for name in _used(b):
+            grid = _sigma0_grid(b, name)
+            same = name not in curves_a or np.array_equal(curves_a[name], grid)
+            of_b[name] = name if same else f"{name} (B)"
+            curves[of_b[name]] = grid
+        return cls(curves, {name: name for name in curves_a}, of_b)
+
+
+def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Palette, keys: dict[str, str]) -> Budget:
+    """Return the sums of one side; ``common`` is the profile whose pattern both sides are weighed with."""
+    s, own = side.scatterers, side.profile
+    assert s is not None
+    assert own is not None
+    index = grouping.index(s)
+    given = np.zeros(len(s), dtype=bool) if s.rcs is None else ~np.isnan(s.rcs)
+    area = np.nan_to_num(np.zeros(len(s)) if s.area is None else s.area)
+    area = np.where(given, 0.0 if s.rcs is None else np.nan_to_num(s.rcs), area)
+    total = grouping.sum(index, area)
+    sigma, shares = _surfaces(side, grouping, index, np.where(given, 0.0, area), palette, keys)
+    sigma = np.where(given, 1.0, sigma)
+    means = {k: np.interp(s.cos_incidence, _GRID, curve) for k, curve in palette.curves.items()}
+    curves = {k: _ratio(grouping.sum(index, area * value), total) for k, value in means.items()}
+    shares = {k: _ratio(v, total) for k, v in shares.items()}
+    shares[_POINT] = _ratio(grouping.sum(index, np.where(given, area, 0.0)), total)
+    curves[_POINT] = np.ones(len(grouping.keys))
+    scattered = area * sigma
+    spread = scattered / np.maximum(s.range, 1e-6) ** 4
+    expected = spread * _gain(own, s, weather=True)
+    columns = {
+        "area": area, "backscatter": scattered, "spread": spread, "expected": expected,
+        "patterned": spread * _gain(common, s, weather=False), "profiled": spread * _gain(own, s, weather=False),
+    }  # fmt: skip
+    sums = {name: grouping.sum(index, value) for name, value in columns.items()}
+    random = grouping.sum(index, np.where(given, 0.0, expected))
+    squares = grouping.sum(index, np.where(given, 0.0, expected) ** 2)
+    return Budget(
+        rows=np.bincount(index, minlength=len(grouping.keys)),
+        **sums,
+        fluctuation_db=_fluctuation_db(random, squares) * _ratio(random, sums["expected"]),
+        mean_range=_ratio(grouping.sum(index, scattered * s.range), sums["backscatter"]),
+        cosine=_ratio(grouping.sum(index, area * s.cos_incidence), total),
+        shares=shares,
+        curves=curves,
+    )
+
+
+def _gain(profile: RadarProfile, s: Scatterers, *, weather: bool) -> FloatArray:
+    """Return (n,) Pt Gt Gr lambda^2 / ((4 pi)^3 losses) [W m^2]."""
+    link = link_amplitude(profile, s.position, s.weather if weather else None)
+    return np.asarray(link**2 * (profile.wavelength_m**2 / FOUR_PI_CUBED), dtype=np.float64)
+
+
+def _surfaces(
+    side: Side, grouping: Grouping, index: IntArray, area: FloatArray, palette: Palette, keys: dict[str, str]
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return (n,) sigma0 of every row, and the area of each material by group."""
+    s = side.scatterers
+    assert s is not None
+    names, number = _materials(side)
+    sigma, areas = np.zeros(len(s)), {}
+    for name, key in keys.items():
+        here = number == names.index(name)
+        sigma[here] = np.interp(s.cos_incidence[here], _GRID, palette.curves[key])
+        areas[key] = grouping.sum(index, np.where(here, area, 0.0))
+    return sigma, areas
+
+
+def _used(side: Side) -> list[str]:
+    names, number = _materials(side)
+    return [names[i] for i in np.unique(number)]
+
+
+def _sigma0_grid(side: Side, name: str) -> FloatArray:
+    """Return sigma0 of a material of a side over the grid of cosines, in the antenna's polarisation and weather."""
+    assert side.materials is not None
+    assert side.profile is not None
+    rain = 0.0 if side.scatterers is None or side.scatterers.weather is None else side.scatterers.weather.rain_mm_h
+    material = side.materials[side.materials.in_weather(name, rain)]
+    cosine = np.maximum(_GRID, 1e-6)
+    return np.asarray(material.sigma0(side.profile.center_hz, cosine, side.profile.antenna.polarization))
+
+
+def _materials(side: Side) -> tuple[tuple[str, ...], IntArray]:
+    """Return the names of the materials and the index of every row; without materials the tag decides."""
+    from ..tags import SemanticTag
+
+    s = side.scatterers
+    assert s is not None
+    assert side.materials is not None
+    if s.material is not None:
+        return s.material_names, s.material.astype(np.int64)
+    names = tuple(side.materials.materials)
+    by_tag = np.zeros(256, dtype=np.int64)
+    for value in np.unique(s.tag):
+        by_tag[value] = names.index(side.materials.for_tag(SemanticTag(int(value)).name))
+    return names, by_tag[s.tag]
+
+
+def _fluctuation_db(total: FloatArray, squares: FloatArray) -> FloatArray:
+    """Return the standard deviation of the level of a sum of exponential powers [dB].
+
+    Of n equal ones it is 10/ln 10 sqrt(psi_1(n)), 5.6 dB at n = 1; unequal ones count as (sum p)^2 / sum p^2.
+    """
+    looks = np.maximum(_ratio(total**2, squares), 1.0)
+    trigamma = 1 / looks + 1 / (2 * looks**2) + 1 / (6 * looks**3)  # asymptotic series, 1.3 % high at n = 1
+    return np.asarray(10 / math.log(10) * np.sqrt(trigamma), dtype=np.float64)
+
+
+def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+
+
+def terms_db(
+    a: tuple[Budget, float, float], b: tuple[Budget, float, float], group: int, *, same_model: bool
+) -> dict[str, float] | None:
+    """Return the terms of one group, B over A; they add up to the difference of its levels.
+
+    Parameters
+    ----------
+    a, b : (Budget, received power [W], coherent power [W])
+    group : int
+    same_model : bool
+        Both sides' echoes are of the ``physical`` model, whose expected power this is.
+
+    Returns
+    -------
+    dict of str to float or None
+        None where a side has nothing, or no area.
+    """
+    (x, p_a, c_a), (y, p_b, c_b) = a, b
+    factors = ("area", "backscatter", "spread", "patterned", "profiled", "expected")
+    values = [[float(getattr(budget, f)[group]) for f in factors] for budget in (x, y)]
+    if min(*values[0], *values[1], p_a, p_b) <= 0:
+        return None
+    steps = [[_db(v[i + 1] / v[i]) for i in range(5)] for v in values]
+    d_sigma, d_range, d_beam, d_profile, d_weather = (q - p for p, q in zip(*steps, strict=True))
+    incidence, material = _incidence_and_material(x, y, group)
+    terms = {
+        "coverage": _db(values[1][0] / values[0][0]),
+        "incidence": incidence,
+        "material": material,
+        "surfaces": d_sigma - incidence - material,
+        "range": d_range,
+        "beam": d_beam,
+        "profile": d_profile,
+        "weather": d_weather,
+    }
+    e_a, e_b = values[0][-1], values[1][-1]
+    if not same_model:
+        return terms | {"model": _db(p_b / e_b) - _db(p_a / e_a)}
+    terms["coherent"] = _db((e_b + c_b) / e_b) - _db((e_a + c_a) / e_a)
+    terms["speckle"] = _db(p_b / (e_b + c_b)) - _db(p_a / (e_a + c_a))
+    return terms
+
+
+def _incidence_and_material(a: Budget, b: Budget, group: int) -> tuple[float, float]:
+    """Return what the cosines alone and the materials alone change, each the mean over the two orders of changing."""
+
+    def mean(view: Budget, made: Budget) -> float:
+        """Mean sigma0 of what ``made`` consists of, at the cosines of ``view``."""
+        return sum(float(share[group] * view.curves[name][group]) for name, share in made.shares.items())
+
+    aa, ab, ba, bb = mean(a, a), mean(a, b), mean(b, a), mean(b, b)
+    if min(aa, ab, ba, bb) <= 0:
+        return 0.0, 0.0
+    return (_db(ba / aa) + _db(bb / ab)) / 2, (_db(ab / aa) + _db(bb / ba)) / 2
+
+
+def _db(ratio: float) -> float:
+    return 10 * math.log10(ratio)

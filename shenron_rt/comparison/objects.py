@@ -1,0 +1,218 @@
+"""One record an object, one a tag: both sides' levels, what the difference is made of, and its cause."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._typing import FloatArray
+from ..dsp import Detections
+from ..tags import SemanticTag
+from .budget import Budget, Grouping, Palette, budget_of, received, terms_db
+from .record import Record
+from .sides import Side
+from .sight import Sight
+from .verdict import CAUSES, blind_verdict, level_verdict
+
+__all__ = ["compare_objects", "compare_tags"]
+
+#: Points of an object whose line of sight is looked at; more change no share by over a percent.
+_SIGHT_POINTS = 2000
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Both sides' levels and budgets over one grouping."""
+
+    grouping: Grouping
+    power: tuple[FloatArray, FloatArray]
+    coherent: tuple[FloatArray, FloatArray]
+    budgets: tuple[Budget, Budget] | None
+    same_model: bool
+
+    @classmethod
+    def of(cls, a: Side, b: Side, by: str) -> _Pair:
+        keys = [getattr(s, by) for side in (a, b) for s in (side.scatterers, side.returns) if s is not None]
+        grouping = Grouping(np.unique(np.concatenate(keys).astype(np.int64)), by)
+        none = np.zeros(len(grouping.keys))
+        levels = [(none, none) if s.returns is None else received(s.returns, s.scatterers, grouping) for s in (a, b)]
+        budgets = None
+        if all(_has_surfaces(s) for s in (a, b)) and a.profile is not None:
+            palette = Palette.of(a, b)
+            budgets = (
+                budget_of(a, a.profile, grouping, palette, palette.of_a),
+                budget_of(b, a.profile, grouping, palette, palette.of_b),
+            )
+        same = all(s.returns is not None and s.returns.model == "physical" for s in (a, b))
+        return cls(grouping, (levels[0][0], levels[1][0]), (levels[0][1], levels[1][1]), budgets, same)
+
+    def terms(self, group: int) -> dict[str, float] | None:
+        if self.budgets is None:
+            return None
+        a, b = (
+            (budget, float(p[group]), float(c[group]))
+            for budget, p, c in zip(self.budgets, self.power, self.coherent, strict=True)
+        )
+        return terms_db(a, b, group, same_model=self.same_model)
+
+    def fluctuation_db(self, group: int) -> float:
+        """Return the standard deviation of the level difference by speckle; a strong coherent echo steadies a level."""
+        if self.budgets is None:
+            return 0.0
+        variance = 0.0
+        for budget, coherent in zip(self.budgets, self.coherent, strict=True):
+            expected = float(budget.expected[group])
+            steady = expected / (expected + float(coherent[group])) if expected > 0 else 0.0
+            variance += (steady * float(budget.fluctuation_db[group])) ** 2
+        return math.sqrt(variance)
+
+
+def _has_surfaces(side: Side) -> bool:
+    s = side.scatterers
+    return s is not None and side.returns is not None and len(s) > 0 and (s.area is not None or s.rcs is not None)
+
+
+def compare_objects(a: Side, b: Side) -> list[Record]:
+    """Return a record for every object of either side, by falling power; empty where neither side has echoes."""
+    if a.returns is None and b.returns is None:
+        return []
+    pair = _Pair.of(a, b, "object_id")
+    names = {**b.names, **a.names}
+    sights = {"a": _sight(a), "b": _sight(b)}
+    records = [_object(pair, group, a, b, names, sights) for group in range(len(pair.grouping.keys))]
+    kept = [r for r in records if r is not None]
+    return sorted(kept, key=lambda r: -max(r["power_db_a"] or -999.0, r["power_db_b"] or -999.0))
+
+
+def compare_tags(a: Side, b: Side) -> list[Record]:
+    """Return a record for every tag of either side, by falling power."""
+    if a.returns is None and b.returns is None:
+        return []
+    pair = _Pair.of(a, b, "tag")
+    records = []
+    for group, tag in enumerate(pair.grouping.keys):
+        p_a, p_b = (_level(p[group]) for p in pair.power)
+        if p_a is None and p_b is None:
+            continue
+        delta = None if p_a is None or p_b is None else p_b - p_a
+        record = Record(tag=SemanticTag(int(tag)).name, power_db_a=p_a, power_db_b=p_b, delta_db=delta)
+        records.append(_with_budget(record, pair, group))
+    return sorted(records, key=lambda r: -max(r["power_db_a"] or -999.0, r["power_db_b"] or -999.0))
+
+
+def _level(power: float) -> float | None:
+    return 10 * math.log10(power) if power > 0 else None
+
+
+def _sight(side: Side) -> Sight | None:
+    s = side.scatterers
+    if s is None or side.origin is None:
+        return None
+    first = np.ones(len(s), dtype=bool) if s.bounces is None else s.bounces <= 1
+    return Sight(s.position[first], s.object_id[first], side.origin)
+
+
+def _object(
+    pair: _Pair, group: int, a: Side, b: Side, names: dict[int, str], sights: dict[str, Sight | None]
+) -> Record | None:
+    number = int(pair.grouping.keys[group])
+    levels = [_level(p[group]) for p in pair.power]
+    if levels == [None, None]:
+        return None
+    tags = [_tag(side, number) for side in (a, b)]
+    record = Record(
+        id=number,
+        name=names.get(number, f"object {number}" if number else "static"),
+        tag=tags[0] or tags[1],
+        tag_a=tags[0],
+        tag_b=tags[1],
+        power_db_a=levels[0],
+        power_db_b=levels[1],
+        delta_db=None if None in levels else levels[1] - levels[0],  # type: ignore[operator]  # neither is None
+        seen_by="both" if None not in levels else "b" if levels[0] is None else "a",
+        detected_a=_detected(a, number),
+        detected_b=_detected(b, number),
+        position_m=_center(a, b, number),
+    )
+    record = _with_budget(record, pair, group)
+    return _judge(record, pair, group, a, b, names, sights)
+
+
+def _with_budget(record: Record, pair: _Pair, group: int) -> Record:
+    """Add rows, area, cosine, range and coherent share of each side, and the terms of the difference."""
+    for side, power, coherent in zip("ab", pair.power, pair.coherent, strict=True):
+        record[f"coherent_share_{side}"] = float(coherent[group] / power[group]) if power[group] > 0 else None
+    if pair.budgets is not None:
+        for side, budget in zip("ab", pair.budgets, strict=True):
+            seen = bool(budget.rows[group])
+            record[f"rows_{side}"] = int(budget.rows[group])
+            record[f"area_m2_{side}"] = float(budget.area[group])
+            record[f"mean_cosine_{side}"] = float(budget.cosine[group]) if seen else None
+            record[f"mean_range_m_{side}"] = float(budget.mean_range[group]) if seen else None
+            shares = {k: float(v[group]) for k, v in budget.shares.items() if v[group] > 0}
+            record[f"materials_{side}"] = Record(sorted(shares.items(), key=lambda kv: -kv[1]))
+    record["terms_db"] = pair.terms(group)
+    return record
+
+
+def _judge(
+    record: Record, pair: _Pair, group: int, a: Side, b: Side, names: dict[int, str], sights: dict[str, Sight | None]
+) -> Record:
+    number, sides = record["id"], {"a": a, "b": b}
+    poor = _poor_side(record)
+    rich = "b" if poor == "a" else "a"
+    seen = sides[rich].scatterers
+    look = sights[poor]
+    sight = None
+    if look is not None and seen is not None:
+        points = seen.position[(seen.object_id == number) & (True if seen.bounces is None else seen.bounces <= 1)]
+        sight = look.of(points[:: max(1, len(points) // _SIGHT_POINTS)], number, names) if len(points) else None
+    if record["delta_db"] is None:
+        poor_side = sides[poor]
+        cause = "not_simulated" if poor_side.returns is None else blind_verdict(poor_side.viewer, sight)
+        verdict = Record(cause=cause, also=[], meaning=CAUSES[cause])
+    else:
+        facts: dict[str, Any] = {
+            "rows_poor": record.get(f"rows_{poor}", 0),
+            "sight": sight,
+            "viewer_poor": sides[poor].viewer,
+            "tags_differ": record["tag_a"] != record["tag_b"],
+        }
+        verdict = level_verdict(record["delta_db"], record["terms_db"], pair.fluctuation_db(group), facts)
+    record.update(verdict)
+    record["sight"] = None if sight is None else Record(sight, from_side=poor)
+    return record
+
+
+def _poor_side(record: Record) -> str:
+    """Return the side that has less of the object: no echo, or less area."""
+    if record["seen_by"] != "both":
+        return "b" if record["seen_by"] == "a" else "a"
+    return "a" if record.get("area_m2_a", 0.0) < record.get("area_m2_b", 0.0) else "b"
+
+
+def _tag(side: Side, number: int) -> str | None:
+    """Return the tag of most of the object's rows."""
+    source = side.scatterers if side.scatterers is not None else side.returns
+    if source is None:
+        return None
+    tags = source.tag[source.object_id == number]
+    return SemanticTag(int(np.bincount(tags).argmax())).name if len(tags) else None
+
+
+def _detected(side: Side, number: int) -> bool | None:
+    found = side.detections
+    return bool(np.any(found.object_id == number)) if isinstance(found, Detections) else None
+
+
+def _center(a: Side, b: Side, number: int) -> list[float] | None:
+    """Return the middle of the object's rows, in the radar frame [m]."""
+    for side in (a, b):
+        if side.scatterers is not None:
+            rows = side.scatterers.object_id == number
+            if rows.any():
+                return [float(v) for v in np.median(side.scatterers.position[rows], axis=0)]
+    return None

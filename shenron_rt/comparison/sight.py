@@ -1,0 +1,95 @@
+"""Whether a point that one side sees can be seen from where the other side looked, by the other side's own points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .._typing import FloatArray, IntArray
+from .record import Record
+
+__all__ = ["Sight"]
+
+#: Rays around a line of sight that have a say.
+_NEIGHBOURS = 4
+#: Rays sampled to find how far apart they are.
+_SAMPLE = 2000
+#: A ray counts while it passes within this many ray spacings of the point.
+_REACH = 1.5
+#: Two surfaces closer than this along a ray are one [m], [share of the range].
+_SAME_M, _SAME_SHARE = 0.3, 0.02
+_MIN_SPREAD_RAD = 1e-4
+
+
+class Sight:
+    """The rays of one side, by direction from where it looked.
+
+    Parameters
+    ----------
+    position : (n, 3) float
+        Where the rays ended [m].
+    object_id : (n,) int
+    origin : (3,) float
+        Where they began [m].
+    """
+
+    def __init__(self, position: FloatArray, object_id: IntArray, origin: FloatArray) -> None:
+        from scipy.spatial import cKDTree
+
+        arm = position - origin
+        self._range = np.linalg.norm(arm, axis=1)
+        seen = self._range > 0
+        self._origin = origin
+        self._range = self._range[seen]
+        self._object = object_id[seen].astype(np.int64)
+        unit = arm[seen] / self._range[:, None]
+        self._tree = cKDTree(unit) if len(unit) else None
+        self.spacing = self._spacing(unit)
+
+    def _spacing(self, unit: FloatArray) -> float:
+        """Return the typical angle between neighbouring rays [rad]: the fourth neighbour is across the wider step."""
+        if self._tree is None or len(unit) <= _NEIGHBOURS:
+            return 0.0
+        sample = unit[:: max(1, len(unit) // _SAMPLE)]
+        distance = np.asarray(self._tree.query(sample, k=_NEIGHBOURS + 1)[0])[:, -1]
+        return max(float(np.median(distance)), _MIN_SPREAD_RAD)
+
+    def of(self, position: FloatArray, object_id: int, names: Mapping[int, str]) -> Record:
+        """Tell what the rays met on the way to some points of an object.
+
+        Returns
+        -------
+        Record
+            Shares of the points, which add up to 1: ``seen``, ``behind_itself``, ``behind_other``, ``other_label`` (a
+            surface of another id in the same place), ``through`` (the ray went on behind the point), ``no_ray``; and
+            ``occluders``, name -> share.
+        """
+        shares = dict.fromkeys(("seen", "behind_itself", "behind_other", "other_label", "through", "no_ray"), 0.0)
+        if self._tree is None or not len(position):
+            return Record(shares, no_ray=1.0, occluders=Record())
+        arm = position - self._origin
+        reach = np.linalg.norm(arm, axis=1)
+        k = min(_NEIGHBOURS, len(self._range))
+        distance, ray = self._tree.query(arm / np.maximum(reach, 1e-9)[:, None], k=k)
+        distance, ray = np.reshape(distance, (len(position), k)), np.reshape(ray, (len(position), k))
+        near = distance <= _REACH * self.spacing
+        weight = near / np.maximum(near.sum(axis=1), 1)[:, None] / len(position)
+        gap = self._range[ray] - reach[:, None]
+        same = np.abs(gap) <= np.maximum(_SAME_M, _SAME_SHARE * reach)[:, None]
+        own = self._object[ray] == object_id
+        before = ~same & (gap < 0)
+        kinds = {
+            "seen": own & same, "behind_itself": own & before, "behind_other": ~own & before,
+            "other_label": ~own & same, "through": ~same & (gap > 0),
+        }  # fmt: skip
+        for name, mask in kinds.items():
+            shares[name] = float(np.sum(weight[mask]))
+        shares["no_ray"] = float(np.mean(~near.any(axis=1)))
+        return Record(shares, occluders=self._occluders(ray, weight, kinds["behind_other"], names))
+
+    def _occluders(self, ray: IntArray, weight: FloatArray, mask: IntArray, names: Mapping[int, str]) -> Record:
+        ids, row = np.unique(self._object[ray[mask]], return_inverse=True)
+        share = np.bincount(row, weight[mask], len(ids)) if len(ids) else np.zeros(0)
+        order = np.argsort(-share)[:3]
+        return Record({names.get(int(ids[i]), f"object {ids[i]}"): float(share[i]) for i in order if share[i] > 0})
