@@ -305,10 +305,9 @@ def _rcs_dbsm(
     gain_tx, gain_rx, loss = (
         10 ** (level / 10) for level in (p.antenna.gain_tx_dbi, p.antenna.gain_rx_dbi, p.antenna.radome_loss_db)
     )
-    if cube.weather is not None:
-        loss = loss * cube.weather.two_way_loss(distance, p.center_hz, p.antenna.polarization)
+    weather = 1.0 if cube.weather is None else cube.weather.two_way_loss(distance, p.center_hz, p.antenna.polarization)
     # behind a pattern's null no cross section can be told: keep the ratio finite
     seen = np.maximum(pattern, _PATTERN_FLOOR)
-    area = rcs_from_power(power, distance, p.wavelength_m, p.tx_power_w, gain_tx * seen, gain_rx * seen, loss)
+    area = rcs_from_power(power, distance, p.wavelength_m, p.tx_power_w, gain_tx * seen, gain_rx * seen, loss * weather)
     with np.errstate(divide="ignore"):
         return np.asarray(np.maximum(10 * np.log10(area), RCS_FLOOR_DBSM), dtype=np.float64)
