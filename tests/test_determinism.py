@@ -17,7 +17,7 @@ import pytest
 import shenron_rt as srt
 from shenron_rt.tracing.backend import backend_status
 
-RAYS = 40_000  # three blocks of 2^14 rows: work is shared among threads
+RAYS = 35_000  # three blocks of 2^14 rows: work is shared among threads
 
 needs_llvm = pytest.mark.skipif(not backend_status("llvm").usable, reason="no usable LLVM")
 
@@ -33,7 +33,7 @@ def scene() -> srt.Scene:
         ],
         actors=[
             {"id": 101, "shape": "car", "xyz_m": (25, 0, 0), "velocity_mps": (9, 1, 0), "yaw_rate_deg_s": 20},
-            {"id": 102, "shape": "sphere:r=0.2", "xyz_m": (12, -3, 1), "tag": "Other", "material": "metal", "aim": 500},
+            {"id": 102, "shape": "sphere:r=0.2,edge=0.01", "xyz_m": (12, -3, 1), "tag": "Other", "aim": 500},
         ],
         point_targets=[{"id": 900, "xyz_m": (40, -2, 1), "rcs_dbsm": 10}],
     )
@@ -65,9 +65,8 @@ def test_the_same_seed_twice_gives_the_same_bytes_of_every_stage() -> None:
 
 def test_a_frame_does_not_depend_on_those_before_it() -> None:
     alone = digests(srt.simulate(scene(), rays=RAYS, frame=3, time=0.3))
-    for k in range(2):
-        srt.simulate(scene(), rays=RAYS, frame=k, time=0.1 * k)
-    srt.simulate(srt.load_scene("clear_road"), rays=RAYS)
+    srt.simulate(scene(), rays=RAYS, frame=2, time=0.2)
+    srt.simulate(srt.load_scene("clear_road"), rays=1000)
     assert digests(srt.simulate(scene(), rays=RAYS, frame=3, time=0.3)) == alone
 
 

@@ -239,7 +239,8 @@ def test_the_stages_one_by_one_are_the_whole() -> None:
 
 def test_background_leaves_a_target_as_it_was() -> None:
     # one bounce and no occlusion: neither the rays of an aimed target nor its seeds know of anything else
-    ball = {"id": 5, "shape": "sphere:r=0.2", "material": "metal", "tag": "Other", "aim": 2000, "xyz_m": (20, 0, 1)}
+    ball = {"id": 5, "shape": "sphere:r=0.2,edge=0.01", "material": "metal", "tag": "Other", "aim": 2000}
+    ball["xyz_m"] = (20, 0, 1)
     alone, crowded = (
         simulate(srt.Scene(actors=[ball], static=static), rays=2000, noise=None) for static in ([], [WALL])
     )
