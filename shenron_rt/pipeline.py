@@ -83,8 +83,8 @@ def simulate(
     Parameters
     ----------
     source : Scene or LidarFrame
-        Of a LiDAR frame the points are the scatterers; nothing is traced. Its normals are estimated unless it has some
-        (:meth:`LidarFrame.without_normals` keeps the recorded cosines).
+        Of a LiDAR frame the points are the scatterers; nothing is traced. The ``physical`` model estimates
+        normals unless the frame has some (:meth:`LidarFrame.without_normals` keeps the recorded cosines).
     profile : RadarProfile, optional
         Replaces the radar's profile and keeps its mount. A LiDAR frame needs one.
     radar : str, optional
@@ -127,7 +127,8 @@ def simulate(
                 "simulate: a LiDAR frame has no radar; give a profile, load_profile('awrl1432') for example"
             )
         name = radar or profile.name
-        source = source if source.normal is not None else source.with_normals()  # metal is nothing but its mirror points
+        if source.normal is None and model == "physical":  # metal is nothing but its mirror points
+            source = source.with_normals()
         scatterers = lidar_scatterers(source, profile, mount, radar=name, seed=seed or 0, index=frame)
         return _processed(scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy)
     if not isinstance(source, Scene):

@@ -1,13 +1,13 @@
 """The mirror-like part of surfaces that come as points with normals, not as tubes with footprints.
 
-Without footprints there is no phase to integrate. Geometric optics still gives the power: a surface whose slopes spread
-by s reflects sigma0 = |Gamma|^2 sec^4(theta) exp(-tan^2(theta) / 2 s^2) / (2 s^2) per area. Summed over an infinite plate
-at distance h that is pi h^2 |Gamma|^2 for every s, and over a sphere pi a^2 |Gamma|^2 (far away), as physical optics has
-it. The spread only has to cover the angle between neighbouring points.
+Without footprints there is no phase to integrate. Geometric optics still gives the power: a surface whose slopes
+spread by s reflects sigma0 = |Gamma|^2 sec^4(theta) exp(-tan^2(theta) / 2 s^2) / (2 s^2) per area. Summed over an
+infinite plate at distance h that is pi h^2 |Gamma|^2 for every s, and over a sphere pi a^2 |Gamma|^2 (far away), as
+physical optics has it. The spread only has to cover the angle between neighbouring points.
 
 References
 ----------
-F. T. Ulaby, R. K. Moore, A. K. Fung, Microwave Remote Sensing, vol. 2, Artech House 1982, chapter 12 (geometric optics).
+F. T. Ulaby, R. K. Moore, A. K. Fung, Microwave Remote Sensing, vol. 2, Artech House 1982, chapter 12.
 """
 
 from __future__ import annotations

@@ -105,6 +105,7 @@ def lidar_scatterers(
     else:
         rate = np.zeros(len(frame)) if frame.range_rate is None else frame.range_rate
     normal = None if frame.normal is None else frame.normal @ eye.rotation
+    seen_from = eye.apply_inverse(np.zeros(3))
     return Scatterers(
         position=position,
         range_rate=rate,
@@ -121,6 +122,7 @@ def lidar_scatterers(
         seed=seed,
         frame=index,
         door="lidar",
+        origin=(float(seen_from[0]), float(seen_from[1]), float(seen_from[2])),
     )
 
 

@@ -83,8 +83,8 @@ def _neighbours(frame: LidarFrame, count: int) -> tuple[IntArray, FloatArray]:
     from scipy.spatial import cKDTree
 
     cells = _cells(frame)
-    reach, index = cKDTree(cells).query(cells, k=count + 1, workers=2)
-    reach, index = reach[:, 1:], index[:, 1:]
+    found = cKDTree(cells).query(cells, k=count + 1, workers=2)
+    reach, index = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
     same = (frame.object_id[index] == frame.object_id[:, None]) & (frame.tag[index] == frame.tag[:, None])
     change = (frame.cos_incidence[index] - frame.cos_incidence[:, None]) / _COSINE_WIDTH
     near = same & (reach < _REACH_CELLS)
@@ -111,16 +111,18 @@ def _fit(frame: LidarFrame, rows: slice, index: IntArray, weight: FloatArray, fl
         return n
 
     def misfit(n: FloatArray) -> FloatArray:
-        return np.einsum("ni,nij,nj->n", n, spread, n)
+        q: FloatArray = np.einsum("ni,nij,nj->n", n, spread, n)
+        return q
 
-    angles = np.arange(_TURNS) * (2.0 * np.pi / _TURNS)
+    angles = np.linspace(0.0, 2.0 * np.pi, _TURNS, endpoint=False)
     cost = np.stack([misfit(normal_at(np.full(len(point), a))) for a in angles], axis=1)
     normal = normal_at(_refined(cost, angles))
     width = np.sqrt(np.maximum(np.linalg.eigvalsh(spread)[:, 1], 0.0))
     wide = width * (size * weight).sum(axis=1) / total > _WIDTH_M
     kept = (np.count_nonzero(weight > 1e-3, axis=1) >= _FEWEST) & wide & (width > 0.05)
     kept &= np.sqrt(np.maximum(misfit(normal), 0.0)) < flatness
-    return np.where(kept[:, None], normal, 0.0)
+    fitted: FloatArray = np.where(kept[:, None], normal, 0.0)
+    return fitted
 
 
 def _refined(cost: FloatArray, angles: FloatArray) -> FloatArray:
@@ -129,7 +131,8 @@ def _refined(cost: FloatArray, angles: FloatArray) -> FloatArray:
     before, here, after = (cost[row, (best + k) % cost.shape[1]] for k in (-1, 0, 1))
     curve = before - 2.0 * here + after
     shift = np.divide(0.5 * (before - after), curve, out=np.zeros_like(curve), where=curve > 1e-15)
-    return angles[best] + np.clip(shift, -0.5, 0.5) * (angles[1] - angles[0])
+    angle: FloatArray = angles[best] + np.clip(shift, -0.5, 0.5) * (angles[1] - angles[0])
+    return angle
 
 
 def _cells(frame: LidarFrame) -> FloatArray:
