@@ -93,6 +93,8 @@ class Scatterers:
         Half edges e_u, e_v of the ray's cell: its corners are the directions d +- e_u +- e_v, d = position / range.
     joined : (n, 4) bool or None
         Whether the surface goes on in the same plane across the cell's edges towards -v, +u, +v, -u.
+    patch : (n,) float or None
+        Area of the flat piece of surface that was hit [m^2]; below ``area`` where the mesh is finer than the rays.
     speckle : (n,) complex or None
         Unit-power circular Gaussian number of the row, drawn by the tracer from the frame's seed.
     jitter : (n, 2) float or None
@@ -111,6 +113,8 @@ class Scatterers:
         What traced the rays; ``""`` where nothing did.
     door : str
         ``"mesh"`` or ``"lidar"``.
+    origin : (3,) tuple of float or None
+        Where a LiDAR saw the rows from [m]; ``None`` is the radar itself, or not known.
 
     Notes
     -----
@@ -130,6 +134,7 @@ class Scatterers:
     material_names: tuple[str, ...] = ()
     footprint: FloatArray | None = None
     joined: BoolArray | None = None
+    patch: FloatArray | None = None
     speckle: ComplexArray | None = None
     jitter: FloatArray | None = None
     rcs: FloatArray | None = None
@@ -140,13 +145,14 @@ class Scatterers:
     frame: int = 0
     backend: str = ""
     door: Literal["mesh", "lidar"] = "mesh"
+    origin: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.position)
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "range_rate": (n,), "cos_incidence": (n,), "object_id": (n,), "tag": (n,),
             "area": (n,), "velocity": (n, 3), "normal": (n, 3), "slope": (n,), "material": (n,), "footprint": (n, 2, 3),
-            "joined": (n, 4), "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
+            "joined": (n, 4), "patch": (n,), "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -243,6 +249,8 @@ class Scatterers:
         values["material_names"] = tuple(str(v) for v in arrays.get("material_names", ()))
         if "weather" in values:
             values["weather"] = Weather.from_array(values["weather"])
+        if "origin" in values:
+            values["origin"] = tuple(float(v) for v in values["origin"])
         for name, kind in (("radar", str), ("backend", str), ("door", str), ("seed", int), ("frame", int)):
             if name in values:
                 values[name] = kind(values[name])

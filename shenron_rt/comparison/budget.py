@@ -4,14 +4,15 @@ For the rows i of an object, with area A, backscatter s, distance R and link L =
 is
     E = lambda^2 / (4 pi)^3 * sum A_i s_i L_i / R_i^4,
 
-and the power received is P; C is what its coherent echoes add up to. In dB, from side A to side B,
+and the power received is P; M is the mirror-like part: what the coherent echoes add up to, or, of LiDAR points, what
+geometric optics expects. In dB, from side A to side B,
 
     10 log10(P_B / P_A) = coverage + incidence + material + surfaces + range + beam + profile + weather
-                          + coherent + speckle
+                          + mirror + speckle
 
 where each term changes one factor: the area; the cosines at which it is seen; what it is made of; which materials lie
 at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
-(E + C) / E; and what remains, P / (E + C), the draw of the speckle. With other echo models than ``physical`` the last
+(E + M) / E; and what remains, P / (E + M), the draw of the speckle. With other echo models than ``physical`` the last
 two are one term, model.
 Points of given RCS count with area = RCS and s = 1.
 """
@@ -26,6 +27,7 @@ import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED
+from ..echo.glint import glint_sigma0
 from ..echo.link import link_amplitude
 from ..scatterers import Scatterers
 from .sides import Side
@@ -74,8 +76,10 @@ class Budget:
     rows : int
     area, backscatter, spread, patterned, profiled, expected : float
         sum A; sum A s; sum A s / R^4; with the pattern of the common profile; of the own; with the weather [W].
+    mirror : float
+        Expected mirror-like part of rows with normals and no footprints [W].
     fluctuation_db : float
-        Standard deviation of the level that speckle gives.
+        Standard deviation that speckle gives the level of ``expected + mirror``.
     mean_range, cosine : float
         Weighted by backscatter, and by area.
     shares : dict of str to (g,) float
@@ -91,6 +95,7 @@ class Budget:
     patterned: FloatArray
     profiled: FloatArray
     expected: FloatArray
+    mirror: FloatArray
     fluctuation_db: FloatArray
     mean_range: FloatArray
     cosine: FloatArray
@@ -172,15 +177,17 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     expected = spread * _gain(own, s, weather=True)
     columns = {
         "area": area, "backscatter": scattered, "spread": spread, "expected": expected,
+        "mirror": area * _mirror(side) / np.maximum(s.range, 1e-6) ** 4 * _gain(own, s, weather=True),
         "patterned": spread * _gain(common, s, weather=False), "profiled": spread * _gain(own, s, weather=False),
     }  # fmt: skip
     sums = {name: grouping.sum(index, value) for name, value in columns.items()}
-    random = grouping.sum(index, np.where(given, 0.0, expected))
-    squares = grouping.sum(index, np.where(given, 0.0, expected) ** 2)
+    random = np.where(given, 0.0, expected + columns["mirror"])
+    total_random = grouping.sum(index, random)
+    share = _ratio(total_random, sums["expected"] + sums["mirror"])
     return Budget(
         rows=np.bincount(index, minlength=len(grouping.keys)),
         **sums,
-        fluctuation_db=_fluctuation_db(random, squares) * _ratio(random, sums["expected"]),
+        fluctuation_db=_fluctuation_db(total_random, grouping.sum(index, random**2)) * share,
         mean_range=_ratio(grouping.sum(index, scattered * s.range), sums["backscatter"]),
         cosine=_ratio(grouping.sum(index, area * s.cos_incidence), total),
         shares=shares,
@@ -209,6 +216,32 @@ def _surfaces(
     return sigma, areas
 
 
+def _mirror(side: Side) -> FloatArray:
+    """Return (n,) sigma0 of the mirror-like part of points with normals; 0 where footprints give a coherent echo."""
+    s, profile = side.scatterers, side.profile
+    assert s is not None
+    assert profile is not None
+    assert side.materials is not None
+    if s.footprint is not None or s.normal is None:
+        return np.zeros(len(s))
+    names, number = _materials(side)
+    te, tm = np.zeros(len(s), dtype=np.complex128), np.zeros(len(s), dtype=np.complex128)
+    height = np.zeros(len(s))
+    for i in np.unique(number):
+        here = number == i
+        material = side.materials[_in_weather(side, names[i])]
+        te[here], tm[here] = material.reflection(profile.center_hz, np.maximum(s.cos_incidence[here], 1e-6))
+        height[here] = 2 * math.pi / profile.wavelength_m * material.roughness_rms_m
+    direction = s.position / np.maximum(s.range, 1e-12)[:, None]
+    return glint_sigma0(te, tm, s.normal, direction, height, profile.antenna.polarization, s.slope)
+
+
+def _in_weather(side: Side, name: str) -> str:
+    assert side.materials is not None
+    weather = None if side.scatterers is None else side.scatterers.weather
+    return side.materials.in_weather(name, 0.0 if weather is None else weather.rain_mm_h)
+
+
 def _used(side: Side) -> list[str]:
     names, number = _materials(side)
     return [names[i] for i in np.unique(number)]
@@ -218,8 +251,7 @@ def _sigma0_grid(side: Side, name: str) -> FloatArray:
     """Return sigma0 of a material of a side over the grid of cosines, in the antenna's polarisation and weather."""
     assert side.materials is not None
     assert side.profile is not None
-    rain = 0.0 if side.scatterers is None or side.scatterers.weather is None else side.scatterers.weather.rain_mm_h
-    material = side.materials[side.materials.in_weather(name, rain)]
+    material = side.materials[_in_weather(side, name)]
     cosine = np.maximum(_GRID, 1e-6)
     return np.asarray(material.sigma0(side.profile.center_hz, cosine, side.profile.antenna.polarization))
 
@@ -292,8 +324,9 @@ def terms_db(
     e_a, e_b = values[0][-1], values[1][-1]
     if not same_model:
         return terms | {"model": _db(p_b / e_b) - _db(p_a / e_a)}
-    terms["coherent"] = _db((e_b + c_b) / e_b) - _db((e_a + c_a) / e_a)
-    terms["speckle"] = _db(p_b / (e_b + c_b)) - _db(p_a / (e_a + c_a))
+    all_a, all_b = e_a + c_a + float(x.mirror[group]), e_b + c_b + float(y.mirror[group])
+    terms["mirror"] = _db(all_b / e_b) - _db(all_a / e_a)
+    terms["speckle"] = _db(p_b / all_b) - _db(p_a / all_a)
     return terms
 
 

@@ -64,7 +64,7 @@ class _Pair:
             return 0.0
         variance = 0.0
         for budget, coherent in zip(self.budgets, self.coherent, strict=True):
-            expected = float(budget.expected[group])
+            expected = float(budget.expected[group] + budget.mirror[group])
             steady = expected / (expected + float(coherent[group])) if expected > 0 else 0.0
             variance += (steady * float(budget.fluctuation_db[group])) ** 2
         return math.sqrt(variance)
@@ -146,13 +146,14 @@ def _with_budget(record: Record, pair: _Pair, group: int) -> Record:
     for side, power, coherent in zip("ab", pair.power, pair.coherent, strict=True):
         record[f"coherent_share_{side}"] = float(coherent[group] / power[group]) if power[group] > 0 else None
     if pair.budgets is not None:
-        for side, budget in zip("ab", pair.budgets, strict=True):
+        for side, budget, coherent in zip("ab", pair.budgets, pair.coherent, strict=True):
             seen = bool(budget.rows[group])
             record[f"rows_{side}"] = int(budget.rows[group])
             record[f"area_m2_{side}"] = float(budget.area[group])
             record[f"mean_cosine_{side}"] = float(budget.cosine[group]) if seen else None
             record[f"mean_range_m_{side}"] = float(budget.mean_range[group]) if seen else None
             shares = {k: float(v[group]) for k, v in budget.shares.items() if v[group] > 0}
+            record[f"mirror_dbw_{side}"] = _level(float(budget.mirror[group] + coherent[group]))
             record[f"materials_{side}"] = Record(sorted(shares.items(), key=lambda kv: -kv[1]))
     record["terms_db"] = pair.terms(group)
     return record

@@ -93,8 +93,7 @@ def _origin(scatterers: Scatterers | None, lidar_origin: ArrayLike | None) -> Fl
         return None
     if scatterers.door == "mesh":
         return np.zeros(3)
-    # a LiDAR door that stores where it looked from needs no argument
-    known = getattr(scatterers, "origin", None) if lidar_origin is None else lidar_origin
+    known = scatterers.origin if lidar_origin is None else lidar_origin
     if known is None:
         return None
     point = np.asarray(known, dtype=np.float64)

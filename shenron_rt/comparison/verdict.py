@@ -41,7 +41,7 @@ CAUSES = {
     "beam": "at other angles in the antenna pattern",
     "profile": "other transmit power, gain, pattern, losses or wavelength",
     "weather": "other weather",
-    "coherent_part": "only one side has the coherent (mirror-like) echo",
+    "mirror_part": "the mirror-like part differs: coherent on one side, none or expected from points on the other",
     "model": "the echo models differ",
     "speckle": "a draw of the speckle",
     "not_simulated": "the object is only in one side's data",
@@ -50,7 +50,7 @@ CAUSES = {
 
 _TERM_CAUSE = {
     "coverage": "different_surfaces", "incidence": "incidence", "material": "material", "surfaces": "surface_mix",
-    "range": "range", "beam": "beam", "profile": "profile", "weather": "weather", "coherent": "coherent_part",
+    "range": "range", "beam": "beam", "profile": "profile", "weather": "weather", "mirror": "mirror_part",
     "model": "model", "speckle": "speckle",
 }  # fmt: skip
 
