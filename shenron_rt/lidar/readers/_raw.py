@@ -11,7 +11,17 @@ import numpy as np
 from ..._typing import FloatArray, IntArray, NDArray
 from ...errors import InputError
 
-__all__ = ["COLUMNS", "RECORD", "RawPoints", "from_fields", "from_matrix", "record_points", "require_points"]
+__all__ = [
+    "COLUMNS",
+    "RECORD",
+    "RawPoints",
+    "from_fields",
+    "from_matrix",
+    "record_points",
+    "require_points",
+    "table_columns",
+    "whole_numbers",
+]
 
 #: One point of ``sensor.lidar.ray_cast_semantic``, packed, little endian (LibCarla ``SemanticLidarData.h``).
 RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("CosAngle", "<f4"), ("ObjIdx", "<u4"), ("ObjTag", "<u4")])
@@ -107,14 +117,26 @@ def from_fields(file: Path, fields: dict[str, NDArray[Any]], layout: str) -> Raw
 
 def from_matrix(file: Path, table: NDArray[Any], layout: str) -> RawPoints:
     """Return the columns of an (n, 6) or (n, 7) array of numbers."""
+    velocity = ", with velocity" if table.ndim == 2 and table.shape[1] == 7 else ""
+    return from_fields(file, table_columns(file, table), f"{layout}{velocity}")
+
+
+def table_columns(file: Path, table: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Return the named columns of an (n, 6) or (n, 7) array."""
     if table.ndim != 2 or table.shape[1] not in (6, 7):
         raise InputError(
             f"{file}: shape {table.shape}; a semantic LiDAR frame is (n, 6): x, y, z, cos, id, tag, or (n, 7) with the "
             "radial velocity before cos. Plain LiDAR (n, 4) has no tags"
         )
     names = ["x", "y", "z", *(["v"] if table.shape[1] == 7 else []), "CosAngle", "ObjIdx", "ObjTag"]
-    columns = {name: table[:, k] for k, name in enumerate(names)}
-    return from_fields(file, columns, f"{layout}{', with velocity' if table.shape[1] == 7 else ''}")
+    return {name: table[:, k] for k, name in enumerate(names)}
+
+
+def whole_numbers(column: NDArray[Any]) -> NDArray[Any]:
+    """Return a column of text as integers where all of it is whole; else as it is, for the refusal that follows."""
+    if np.all(np.isfinite(column)) and np.all(column == np.rint(column)):
+        return column.astype(np.int64)
+    return column
 
 
 def as_unsigned(file: Path, column: NDArray[Any], name: str) -> tuple[IntArray, tuple[str, ...]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._typing import NDArray
 from ...errors import InputError
-from ._raw import RawPoints, from_fields, require_points
+from ._raw import RawPoints, from_fields, require_points, whole_numbers
 
 __all__ = ["read_ply_points"]
 
@@ -96,7 +96,10 @@ def _ascii(file: Path, content: bytes, header: _Header) -> dict[str, NDArray[Any
             f"{file}: the header promises {header.points} points of {width} values, the file holds {rows.shape[0]} of "
             f"{rows.shape[1]}; it is cut short or was edited"
         )
-    return {name: rows[:, k] for k, (name, _) in enumerate(header.properties)}
+    columns = {name: rows[:, k] for k, (name, _) in enumerate(header.properties)}
+    return {
+        name: whole_numbers(columns[name]) if kind[0] in "iu" else columns[name] for name, kind in header.properties
+    }
 
 
 def _binary(file: Path, content: bytes, header: _Header) -> dict[str, NDArray[Any]]:

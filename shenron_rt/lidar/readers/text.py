@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ._raw import RawPoints, from_fields, from_matrix, require_points
+from ._raw import COLUMNS, RawPoints, from_fields, require_points, table_columns, whole_numbers
 
 __all__ = ["looks_like_text", "read_text_points"]
 
@@ -46,8 +46,13 @@ def read_text_points(file: Path, content: bytes) -> RawPoints:
     except ValueError as error:
         raise InputError(f"{file}: read as a text table: {error}; is the file cut short?") from None
     if titled and len(names) == rows.shape[1]:
-        return from_fields(file, {name: rows[:, k] for k, name in enumerate(names)}, "text table with names")
-    return from_matrix(file, rows, "text table")
+        columns = {name: rows[:, k] for k, name in enumerate(names)}
+    else:
+        columns = table_columns(file, rows)
+    counted = {name.lower() for what in ("object_id", "tag") for name in COLUMNS[what]}
+    columns = {name: whole_numbers(c) if name.lower() in counted else c for name, c in columns.items()}
+    velocity = ", with velocity" if rows.shape[1] == 7 else ""
+    return from_fields(file, columns, f"text table{velocity}")
 
 
 def _is_number(word: str) -> bool:
