@@ -41,4 +41,3 @@ def link_amplitude(profile: RadarProfile, position: FloatArray, weather: Weather
     if weather is not None:
         amplitude = amplitude / np.sqrt(weather.two_way_loss(distance, profile.center_hz, antenna.polarization))
     return amplitude
-
