@@ -231,17 +231,32 @@ def _coherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Cu
     reflect = np.maximum(np.abs(curves.te), np.abs(curves.tm))
     keep = (scale * reflect * solid) ** 2 > _NEGLIGIBLE * speckle
     joined = np.zeros((len(rows), 4), dtype=bool) if scatterers.joined is None else scatterers.joined[rows]
-    geometry = (light.direction[rows], scatterers.footprint[rows], scatterers.normal[rows], distance)
+    resolved = _resolved(scatterers, rows)
+    footprint = scatterers.footprint[rows] * resolved[:, None, None]
+    geometry = (light.direction[rows], footprint, scatterers.normal[rows], distance)
     keep &= ~interior(*geometry, wavenumber, joined)
     kept = np.flatnonzero(keep)
     u, edges, normal, reach = (g[kept] for g in geometry)
     gamma = backscatter_reflection(curves.te[kept], curves.tm[kept], normal, u, profile.antenna.polarization)
-    integral = tube_integral(u, edges, normal, reach, wavenumber, joined[kept])
+    integral = tube_integral(u, edges, normal, reach, wavenumber, joined[kept]) / resolved[kept]
     # The one conjugation from e^{+jwt} echo phasors to the de-chirped signal conj(rx) tx.
     amplitude = np.conj(scale[kept] * gamma * integral)
     strong = np.flatnonzero(np.abs(amplitude) ** 2 > _NEGLIGIBLE * speckle[kept])
     source = rows[kept[strong]]
     return _Echo(amplitude[strong], scatterers.position[source], source, True)
+
+
+def _resolved(scatterers: Scatterers, rows: IntArray) -> FloatArray:
+    """Return the share, up to 1, of the sides of a tube's footprint that the flat piece it hit can fill.
+
+    A tube wider than the facets of a curved mesh lights n = 1 / share^2 of them, of like size, tilt and reflection but
+    of independent phase, and only one is known. The known one stands for all: its integral, over its own size, times
+    sqrt(n), has their mean power. Extended over the whole tube, one facet would be a mirror that the body has not.
+    """
+    if scatterers.patch is None or scatterers.area is None:
+        return np.ones(len(rows))
+    share: FloatArray = np.sqrt(np.minimum(scatterers.patch[rows] / scatterers.area[rows], 1.0))
+    return share
 
 
 def _incoherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Curves, profile: RadarProfile) -> _Echo:

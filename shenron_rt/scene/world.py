@@ -39,6 +39,8 @@ class Body:
         Index into the material names of the world.
     plane : (f,) int32
         Equal for faces of one plane and one material.
+    patch : (f,) float
+        Area of all faces of that plane [m^2].
     """
 
     object_id: int
@@ -47,6 +49,7 @@ class Body:
     tag: IntArray
     material: IntArray
     plane: IntArray
+    patch: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,8 @@ class World:
     face_material : (f,) uint16
     face_plane : (f,) int32
         Equal for coplanar faces of one body and one material.
+    face_patch : (f,) float
+        Area of all faces of that plane [m^2].
     bodies : tuple of Body
     vertex_start : (b + 1,) int64
         Where each body's vertices begin.
@@ -87,6 +92,7 @@ class World:
     face_tag: IntArray
     face_material: IntArray
     face_plane: IntArray
+    face_patch: FloatArray
     bodies: tuple[Body, ...]
     vertex_start: IntArray
     drift: FloatArray
@@ -180,7 +186,9 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
         mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
     object_id = int(getattr(entry, "id", 0))
     face_material = index[mesh.part]
-    return Body(object_id, entry, mesh, face_tag[keep], face_material, _planes(mesh, face_material))
+    plane = _planes(mesh, face_material)
+    patch = np.bincount(plane, weights=mesh.face_area)[plane]
+    return Body(object_id, entry, mesh, face_tag[keep], face_material, plane, patch)
 
 
 def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
@@ -248,6 +256,7 @@ def build_world(
         face_tag=_stack([b.tag for b in bodies], (0,), np.uint8),
         face_material=_stack([b.material for b in bodies], (0,), np.uint16),
         face_plane=_stack(planes, (0,), np.int32),
+        face_patch=_stack([b.patch for b in bodies], (0,), np.float64),
         bodies=bodies,
         vertex_start=start,
         drift=_stack([d[None] for d in drift], (0, 3), np.float64),

@@ -255,6 +255,7 @@ def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns
         "normal": normal * facing[:, None],
         "material": world.face_material[face],
         "footprint": cells.edges_of(cell),
+        "patch": world.face_patch[face],
         "rcs": np.full(len(cell), np.nan),
         "bounces": np.ones(len(cell), dtype=np.uint8),
     }
@@ -287,6 +288,7 @@ def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> C
         "normal": -d[seen],
         "material": np.zeros(n, dtype=np.uint16),
         "footprint": np.zeros((n, 2, 3)),
+        "patch": np.zeros(n),
         "joined": np.zeros((n, 4), dtype=np.bool_),
         "speckle": np.zeros(n, dtype=np.complex128),
         "jitter": np.zeros((n, 2)),
