@@ -17,6 +17,7 @@ from .scatterers import Scatterers, Weather
 if TYPE_CHECKING:
     from .config.materials import MaterialTable
     from .config.profile import RadarProfile
+    from .echo.shenron import ShenronModel
 
 __all__ = ["Returns", "illuminate"]
 
@@ -125,7 +126,7 @@ def illuminate(
     scatterers: Scatterers,
     profile: RadarProfile,
     *,
-    model: str = "physical",
+    model: str | ShenronModel = "physical",
     materials: MaterialTable | str | os.PathLike[str] | None = None,
 ) -> Returns:
     """Light scatterers with a radar, by an echo model and the radar equation.
@@ -135,10 +136,11 @@ def illuminate(
     scatterers : Scatterers
         In the frame of that radar.
     profile : RadarProfile
-    model : str
-        ``"physical"``.
+    model : str or ShenronModel
+        ``"physical"``; ``"shenron"``, the formulas of C-Shenron corrected; ``"shenron:as_released"``, as they were; or
+        any mixture, see :meth:`shenron_rt.echo.shenron.ShenronModel.parse`.
     materials : MaterialTable, name or path, optional
-        Default ``"automotive"``.
+        Default ``"automotive"``. The ``shenron`` model has its own five.
 
     Returns
     -------
@@ -149,8 +151,12 @@ def illuminate(
     InputError
         An unknown model or material.
     """
+    if not isinstance(model, str) or model.partition(":")[0] == "shenron":
+        from .echo.shenron import ShenronModel, shenron_returns
+
+        return shenron_returns(scatterers, profile, ShenronModel.parse(model) if isinstance(model, str) else model)
     if model != "physical":
-        raise InputError(f"unknown echo model {model!r}; known: physical")
+        raise InputError(f"unknown echo model {model!r}; known: physical, shenron, shenron:as_released")
     from .config.materials import MaterialTable, load_materials
     from .echo.physical import physical_returns
 

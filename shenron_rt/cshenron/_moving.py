@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from .._parallel import pool
 from .._typing import ComplexArray, FloatArray
 from .radar import ReleasedRadar
 
@@ -51,9 +52,13 @@ def channel_sums(
     """
     out = np.zeros(radar.shape, dtype=np.complex128)
     for first, last in _blocks(radar, delay, hop, step):
-        for channel in range(radar.channels):
-            there = delay + channel * step + first * hop
-            out[first:last, channel] = _channel(radar, strength, there, hop, last - first, accuracy)
+        start, chirps = delay + first * hop, last - first
+
+        def one(channel: int, start: FloatArray = start, chirps: int = chirps) -> ComplexArray:
+            return _channel(radar, strength, start + channel * step, hop, chirps, accuracy)
+
+        for channel, part in enumerate(pool().map(one, range(radar.channels))):
+            out[first:last, channel] = part
     return out
 
 
@@ -98,7 +103,9 @@ def _channel(
     total = np.zeros(chirps * radar.samples, dtype=np.complex128)
     for weight, parameter, wave in _taylor(cross, square, accuracy / 4):
         eps = float(np.clip(accuracy / (6 * weight), 1e-13, 1e-3))
-        sums = finufft.nufft2d3(fast, slow, source * parameter, fast_targets, slow_targets, isign=1, eps=eps)
+        sums = finufft.nufft2d3(
+            fast, slow, source * parameter, fast_targets, slow_targets, isign=1, eps=eps, nthreads=1
+        )
         total += wave * sums
     return total.reshape(chirps, radar.samples)
 
@@ -110,15 +117,16 @@ def _taylor(
 
     Both factors are scaled so that the first is at most 1.
     """
-    scaled: list[tuple[FloatArray, ComplexArray, float]] = []
+    scaled: list[tuple[FloatArray, FloatArray, float]] = []
     for point, target in (cross, square):
         top = max(float(np.abs(point).max()), 1e-300)
-        scaled.append((point / top, 1j * top * target, top * float(np.abs(target).max())))
+        scaled.append((point / top, top * target, top * float(np.abs(target).max())))
     (x, u, big_x), (y, w, big_y) = scaled
     terms = []
     for p, q in itertools.product(range(16), repeat=2):
         largest = big_x**p / math.factorial(p) * big_y**q / math.factorial(q)
         if largest > tolerance or p == q == 0:
-            wave: ComplexArray = u**p * w**q / (math.factorial(p) * math.factorial(q))
+            wave = np.asarray(1j ** (p + q) * (u**p * w**q), dtype=np.complex128)
+            wave /= math.factorial(p) * math.factorial(q)
             terms.append((largest, x**p * y**q, wave))
     return terms

@@ -6,15 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..echo._shenron_loss import LIGHT_SPEED
+from ..echo._shenron_loss import GAIN, LIGHT_SPEED
 
 if TYPE_CHECKING:
     from ..config.profile import RadarProfile
 
-__all__ = ["GAIN", "ReleasedRadar"]
-
-#: System gain of both released profiles, 105 dB.
-GAIN = 10**10.5
+__all__ = ["ReleasedRadar"]
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,13 @@ nonuniform FFT per p. The number of terms follows from the accuracy.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from .._parallel import pool
 from .._typing import ArrayLike, ComplexArray, FloatArray
 from ..echo._shenron_loss import LIGHT_SPEED
 from ..errors import InputError
@@ -101,7 +103,7 @@ def synthesize_released(
     loss: ArrayLike,
     speed: ArrayLike = 0.0,
     *,
-    accuracy: float = 1e-8,
+    accuracy: float = 1e-7,
 ) -> ComplexArray:
     """Synthesise the noise-free ADC cube of the released formula.
 
@@ -158,10 +160,13 @@ class _ChirpSum:
     def of(cls, radar: ReleasedRadar, points: _Points, accuracy: float) -> _ChirpSum:
         largest = max(float(np.abs(points.step).max()), 1e-30)
         form = _expansion(radar, largest, accuracy / 4)
-        x = points.step / largest
-        orders = np.arange(len(form))
-        polynomials = np.cos(orders[:, None] * np.arccos(np.clip(x, -1.0, 1.0)))
         weights = np.abs(form).max(axis=(1, 2))
+        needed = np.cumsum(weights[::-1])[::-1] > accuracy / 4
+        form, weights = form[: needed.sum()], weights[: needed.sum()]
+        x = points.step / largest
+        polynomials = np.ones((len(form), len(x)))
+        for p in range(1, len(form)):  # Chebyshev recurrence
+            polynomials[p] = x if p == 1 else 2 * x * polynomials[p - 1] - polynomials[p - 2]
         return cls(radar, points, form, weights, polynomials, accuracy)
 
     def __call__(self, delay: FloatArray) -> ComplexArray:
@@ -179,12 +184,17 @@ class _ChirpSum:
         constant += channel_rate * i_mid + sample_rate * m_mid
         source = _phasor(constant) * p.strength
         first, second = (TAU * (rate - np.rint(rate)) for rate in (channel_rate, sample_rate))
-        total = np.zeros((radar.channels, radar.samples), dtype=np.complex128)
-        for form, weight, polynomial in zip(self.form, self.weights, self.polynomials, strict=True):
-            eps = min(self.accuracy / (TRANSFORM_MARGIN * weight), 1e-3)
-            modes = finufft.nufft2d1(first, second, source * polynomial, total.shape, isign=1, eps=max(eps, 1e-13))
-            total += form * modes
-        return total
+
+        def term(p: int) -> ComplexArray:
+            eps = float(np.clip(self.accuracy / (TRANSFORM_MARGIN * self.weights[p]), 1e-13, 1e-3))
+            modes: ComplexArray = finufft.nufft2d1(
+                first, second, source * self.polynomials[p], self.form.shape[1:], isign=1, eps=eps, nthreads=1
+            )
+            modes *= self.form[p]
+            return modes
+
+        terms = pool().map(term, range(len(self.form)))
+        return functools.reduce(np.add, terms)
 
 
 def _phasor(cycles: FloatArray) -> ComplexArray:

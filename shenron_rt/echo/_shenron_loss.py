@@ -14,12 +14,15 @@ from .._typing import ArrayLike, FloatArray, IntArray
 from ._shenron_tables import PERMITTIVITY, ROUGHNESS_M
 
 __all__ = [
-    "LIGHT_SPEED", "LOBE_EXPONENT", "LOBE_SHARE", "SPECULAR_HALF_ANGLE", "VOXEL", "coherent_share", "incident_power",
-    "lobe", "reflectance", "released_loss", "released_terms",
+    "GAIN", "K_SQUARED", "LIGHT_SPEED", "LOBE_EXPONENT", "LOBE_SHARE", "SCATTER_GAIN", "SPECULAR_GAIN",
+    "SPECULAR_HALF_ANGLE", "VOXEL", "coherent_share", "incident_power", "lobe", "reflectance", "released_loss",
+    "released_terms",
 ]  # fmt: skip
 
 #: Speed of light of the public code [m/s].
 LIGHT_SPEED = 3.0e8
+#: System gain of both released profiles, 105 dB.
+GAIN = 10**10.5
 #: Density constant of the incident power.
 K_SQUARED = 3282.0
 #: Surfel of a point in azimuth and in polar angle, whatever the LiDAR's grid is [rad].

@@ -32,8 +32,8 @@ RELEASED_CLASS: IntArray = np.array([0, 4, 2, 0, 11, 5, 0, 0, 1, 8, 12, 3, 7, 10
 #: Index = internal class, value = material.
 CLASS_TO_MATERIAL: IntArray = np.array([0, 2, 2, 2, 4, 4, 4, 4, 1, 1, 0, 3, 4, 4, 4, 4, 4, 4, 4])
 
-# Nouns by material; what is not listed has no echo, as the road has none in the public code. Those after the comma
-# in each row were dropped or given a foreign class there.
+# What is not listed has no echo: the road and its like have none in the public code either. Terrain, Static and Dynamic
+# were dropped there; riders are people, not metal.
 # fmt: off
 _BY_MATERIAL: dict[int, tuple[str, ...]] = {
     WOOD: ("Vegetation", "Terrain"),
