@@ -81,7 +81,7 @@ def top_view(
         bar.ax.tick_params(labelsize=8)
     figure.text(0.08, 0.955, title or "Scatterers, top view", fontsize=11, weight="bold", va="center")
     figure.text(
-        0.86, 0.918, f"{len(scatterers):,} scatterers, mesh edges grey, o detections", fontsize=8, ha="right",
+        0.86, 0.918, f"{len(scatterers):,} scatterers, {'' if mesh is None else 'mesh edges grey, '}o detections", fontsize=8, ha="right",
         color="#555b66",
     )  # fmt: skip
     return figure
