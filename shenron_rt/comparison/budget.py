@@ -10,11 +10,17 @@ geometric optics expects. In dB, from side A to side B,
     10 log10(P_B / P_A) = coverage + incidence + material + surfaces + range + beam + profile + weather
                           + mirror + speckle
 
-where each term changes one factor: the area; the cosines at which it is seen; what it is made of; which materials lie
-at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
-(E + M) / E; and what remains, P / (E + M), the draw of the speckle. With other echo models than ``physical`` the last
-two are one term, model.
+where each term belongs to one factor: the area; the cosines at which it is seen; what it is made of; which materials
+lie at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
+and speckle is the rest, P / (E + M), the draw. The sum E + M splits by logarithmic means: M takes
+(M_B - M_A) / L(E_B + M_B, E_A + M_A) nepers, L(x, y) = (x - y) / ln(x / y), and each factor of E counts with weight
+L(E_B, E_A) / L(E_B + M_B, E_A + M_A), so that what changes a negligible part explains nothing. With other echo models
+than ``physical`` the last two are one term, model, and that weight is 1.
 Points of given RCS count with area = RCS and s = 1.
+
+References
+----------
+B. W. Ang, "The LMDI approach to decomposition analysis: a practical guide", Energy Policy 33 (2005) 867-871.
 """
 
 from __future__ import annotations
@@ -324,10 +330,19 @@ def terms_db(
     e_a, e_b = values[0][-1], values[1][-1]
     if not same_model:
         return terms | {"model": _db(p_b / e_b) - _db(p_a / e_a)}
-    all_a, all_b = e_a + c_a + float(x.mirror[group]), e_b + c_b + float(y.mirror[group])
-    terms["mirror"] = _db(all_b / e_b) - _db(all_a / e_a)
-    terms["speckle"] = _db(p_b / all_b) - _db(p_a / all_a)
+    m_a, m_b = c_a + float(x.mirror[group]), c_b + float(y.mirror[group])
+    whole = _log_mean(e_b + m_b, e_a + m_a)
+    terms = {name: value * _log_mean(e_b, e_a) / whole for name, value in terms.items()}
+    terms["mirror"] = 10 / math.log(10) * (m_b - m_a) / whole
+    terms["speckle"] = _db(p_b / (e_b + m_b)) - _db(p_a / (e_a + m_a))
     return terms
+
+
+def _log_mean(x: float, y: float) -> float:
+    """Return (x - y) / ln(x / y), the logarithmic mean of two positive numbers; x where they are equal."""
+    difference = (x - y) / y
+    # the quotient loses its digits where x is near y; there its series has them
+    return y * (1 + difference / 2) if abs(difference) < 1e-6 else (x - y) / math.log(x / y)
 
 
 def _incidence_and_material(a: Budget, b: Budget, group: int) -> tuple[float, float]:

@@ -13,8 +13,6 @@ __all__ = ["Sight"]
 
 #: Rays around a line of sight that have a say.
 _NEIGHBOURS = 4
-#: Rays sampled to find how far apart they are.
-_SAMPLE = 2000
 #: A ray counts while it passes within this many ray spacings of the point.
 _REACH = 1.5
 #: Two surfaces closer than this along a ray are one [m], [share of the range].
@@ -44,16 +42,16 @@ class Sight:
         self._range = self._range[seen]
         self._object = object_id[seen].astype(np.int64)
         unit = arm[seen] / self._range[:, None]
+        self._unit = unit
         self._tree = cKDTree(unit) if len(unit) else None
-        self.spacing = self._spacing(unit)
 
-    def _spacing(self, unit: FloatArray) -> float:
-        """Return the typical angle between neighbouring rays [rad]: the fourth neighbour is across the wider step."""
-        if self._tree is None or len(unit) <= _NEIGHBOURS:
-            return 0.0
-        sample = unit[:: max(1, len(unit) // _SAMPLE)]
-        distance = np.asarray(self._tree.query(sample, k=_NEIGHBOURS + 1)[0])[:, -1]
-        return max(float(np.median(distance)), _MIN_SPREAD_RAD)
+    def _spacing(self, ray: IntArray) -> FloatArray:
+        """Return the angle between some rays and their neighbours [rad]; the fourth is across the wider step."""
+        k = min(_NEIGHBOURS + 1, len(self._unit))
+        assert self._tree is not None
+        rays, back = np.unique(ray, return_inverse=True)
+        distance = np.reshape(np.asarray(self._tree.query(self._unit[rays], k=k)[0]), (len(rays), k))[:, -1]
+        return np.asarray(np.maximum(distance, _MIN_SPREAD_RAD)[back].reshape(ray.shape), dtype=np.float64)
 
     def of(self, position: FloatArray, object_id: int, names: Mapping[int, str]) -> Record:
         """Tell what the rays met on the way to some points of an object.
@@ -73,7 +71,7 @@ class Sight:
         k = min(_NEIGHBOURS, len(self._range))
         distance, ray = self._tree.query(arm / np.maximum(reach, 1e-9)[:, None], k=k)
         distance, ray = np.reshape(distance, (len(position), k)), np.reshape(ray, (len(position), k))
-        near = distance <= _REACH * self.spacing
+        near = distance <= _REACH * self._spacing(ray)
         weight = near / np.maximum(near.sum(axis=1), 1)[:, None] / len(position)
         gap = self._range[ray] - reach[:, None]
         same = np.abs(gap) <= np.maximum(_SAME_M, _SAME_SHARE * reach)[:, None]

@@ -98,6 +98,8 @@ def level_verdict(
     causes = list(
         dict.fromkeys(_cause(name, facts) for name in chosen if name == chosen[0] or abs(usable[name]) >= worth)
     )
+    if "mirror_part" in causes and facts.get("rows_poor", MIN_POINTS) < MIN_POINTS:
+        causes.append("too_few_points")  # so few that no point need lie where the surface is a mirror
     return _record(causes[0], causes[1:], delta_db, explained, tolerance)
 
 
