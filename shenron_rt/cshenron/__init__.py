@@ -1,1 +1,11 @@
 """The public C-Shenron pipeline, clean-room: its points, loss, ADC samples, images and detector."""
+
+from __future__ import annotations
+
+from .dsp import cartesian_image, cfar, doppler_slice, fblr, range_angle, view_mask
+from .model import ShenronRadarModel
+from .place import LidarGrid
+
+__all__ = [
+    "LidarGrid", "ShenronRadarModel", "cartesian_image", "cfar", "doppler_slice", "fblr", "range_angle", "view_mask",
+]  # fmt: skip
