@@ -95,6 +95,9 @@ class Scatterers:
         Whether the surface goes on in the same plane across the cell's edges towards -v, +u, +v, -u.
     patch : (n,) float or None
         Area of the flat piece of surface that was hit [m^2]; below ``area`` where the mesh is finer than the rays.
+    bend : (n,) float or None
+        Angle between the surface's normals here and at the neighbouring rays, RMS [rad]; 0 where ``patch`` is wider
+        than the ray.
     speckle : (n,) complex or None
         Unit-power circular Gaussian number of the row, drawn by the tracer from the frame's seed.
     jitter : (n, 2) float or None
@@ -135,6 +138,7 @@ class Scatterers:
     footprint: FloatArray | None = None
     joined: BoolArray | None = None
     patch: FloatArray | None = None
+    bend: FloatArray | None = None
     speckle: ComplexArray | None = None
     jitter: FloatArray | None = None
     rcs: FloatArray | None = None
@@ -152,7 +156,8 @@ class Scatterers:
         shapes: dict[str, tuple[int, ...]] = {
             "position": (n, 3), "range_rate": (n,), "cos_incidence": (n,), "object_id": (n,), "tag": (n,),
             "area": (n,), "velocity": (n, 3), "normal": (n, 3), "slope": (n,), "material": (n,), "footprint": (n, 2, 3),
-            "joined": (n, 4), "patch": (n,), "speckle": (n,), "jitter": (n, 2), "rcs": (n,), "bounces": (n,),
+            "joined": (n, 4), "patch": (n,), "bend": (n,), "speckle": (n,), "jitter": (n, 2), "rcs": (n,),
+            "bounces": (n,),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)

@@ -38,6 +38,8 @@ _TABLE = 1025
 #: A coherent echo this far below the mean of the same tube's own speckle is left out (power); the hundred or so tubes
 #: of one Fresnel zone stay 20 dB below the speckle even when they all add in phase.
 _NEGLIGIBLE = 1e-4
+#: Phase at the rim of a tube up to which a bent surface echoes as one mirror [rad].
+_ONE_MIRROR = 0.5 * math.pi
 #: Furthest an incoherent echo moves within its footprint, as a share of its range.
 _MAX_SHIFT = 0.5
 
@@ -231,7 +233,7 @@ def _coherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Cu
     reflect = np.maximum(np.abs(curves.te), np.abs(curves.tm))
     keep = (scale * reflect * solid) ** 2 > _NEGLIGIBLE * speckle
     joined = np.zeros((len(rows), 4), dtype=bool) if scatterers.joined is None else scatterers.joined[rows]
-    resolved = _resolved(scatterers, rows)
+    resolved = _resolved(scatterers, rows, wavenumber)
     footprint = scatterers.footprint[rows] * resolved[:, None, None]
     geometry = (light.direction[rows], footprint, scatterers.normal[rows], distance)
     keep &= ~interior(*geometry, wavenumber, joined)
@@ -246,17 +248,22 @@ def _coherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Cu
     return _Echo(amplitude[strong], scatterers.position[source], source, True)
 
 
-def _resolved(scatterers: Scatterers, rows: IntArray) -> FloatArray:
-    """Return the share, up to 1, of the sides of a tube's footprint that the flat piece it hit can fill.
+def _resolved(scatterers: Scatterers, rows: IntArray, wavenumber: float) -> FloatArray:
+    """Return the share, up to 1, of the sides of a tube's footprint over which the surface is one mirror.
 
-    A tube wider than the facets of a curved mesh lights n = 1 / share^2 of them, of like size, tilt and reflection but
-    of independent phase, and only one is known. The known one stands for all: its integral, over its own size, times
-    sqrt(n), has their mean power. Extended over the whole tube, one facet would be a mirror that the body has not.
+    A tube wider than the facets of a curved mesh lights n = 1 / share^2 of them, of like size, tilt and reflection.
+    Where the surface bends by less than a fraction of the wavelength over the tube they echo as one mirror, as wide as
+    the tube. Where it bends by more, their phases are independent and only one is known: its integral, over its own
+    size, times sqrt(n), has the mean power of all; extended over the tube it would be a mirror that the body has not.
     """
-    if scatterers.patch is None or scatterers.area is None:
+    if scatterers.patch is None or scatterers.bend is None or scatterers.area is None:
         return np.ones(len(rows))
-    share: FloatArray = np.sqrt(np.minimum(scatterers.patch[rows] / scatterers.area[rows], 1.0))
-    return share
+    area = scatterers.area[rows]
+    share = np.sqrt(np.minimum(scatterers.patch[rows] / area, 1.0))
+    # phase by which the surface leaves its tangent plane at the tube's rim, 2k (side / 2) (bend / 4)
+    departure = 0.25 * wavenumber * np.sqrt(area) * scatterers.bend[rows]
+    resolved: FloatArray = share ** -np.expm1(-((departure / _ONE_MIRROR) ** 2))
+    return resolved
 
 
 def _incoherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _Curves, profile: RadarProfile) -> _Echo:

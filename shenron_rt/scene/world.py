@@ -187,7 +187,7 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
     object_id = int(getattr(entry, "id", 0))
     face_material = index[mesh.part]
     plane = _planes(mesh, face_material)
-    patch = np.bincount(plane, weights=mesh.face_area)[plane]
+    patch: FloatArray = np.bincount(plane, weights=mesh.face_area)[plane].astype(np.float64)
     return Body(object_id, entry, mesh, face_tag[keep], face_material, plane, patch)
 
 
@@ -206,9 +206,7 @@ def _planes(mesh: TaggedMesh, material: IntArray) -> IntArray:
     return plane.astype(np.int32)
 
 
-def build_world(
-    scene: Scene, radar: Placed, time: float, bodies: tuple[Body, ...], materials: MaterialTable
-) -> World:
+def build_world(scene: Scene, radar: Placed, time: float, bodies: tuple[Body, ...], materials: MaterialTable) -> World:
     """Place every body as it stands at ``time``, as seen from ``radar``.
 
     Parameters

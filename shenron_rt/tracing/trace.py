@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .._parallel import map_blocks, pool
-from .._typing import ComplexArray, FloatArray, IntArray, NDArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
 from ..config._base import Placed
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
@@ -129,7 +129,7 @@ def trace(
         for block in _all_rows(world, launch.cells, p, h, d.result())
     ]
     rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s))
-    columns = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
+    columns: dict[str, Any] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     return Scatterers(
         **columns,
         material_names=tuple(world.materials.materials),
@@ -223,10 +223,29 @@ def _all_rows(
         # across each edge: the plane of the neighbouring cell; none, -1, picks the last
         beyond = np.where(cells.neighbour[index] < 0, np.int32(-2), plane[cells.neighbour[index]])
         columns["joined"] = beyond == plane[index][:, None]
+        columns["bend"] = _bend(world, cells, hit, index, columns["patch"] < columns["area"])
         columns["speckle"], columns["jitter"] = drawn[0][index], drawn[1][index]
         return columns
 
     return map_blocks(block, len(cell)) or [block(slice(0, 0))]
+
+
+def _bend(world: World, cells: Cells, hit: IntArray, cell: IntArray, wanted: BoolArray) -> FloatArray:
+    """Return (m,) RMS angle between the normals of cells and of their neighbours on the same body, where wanted [rad].
+
+    A right angle where no neighbour hits the body: it is smaller than a cell.
+    """
+    bend = np.zeros(len(cell))
+    rows = np.flatnonzero(wanted)
+    face = hit[cell[rows]]
+    neighbour = cells.neighbour[cell[rows]]
+    other = np.where(neighbour < 0, np.int32(-1), hit[neighbour])
+    same = (other >= 0) & (world.face_body[other] == world.face_body[face][:, None])
+    cos = np.abs(np.einsum("nj,nkj->nk", world.face_normal[face], world.face_normal[other]))
+    square = np.where(same, 2.0 * np.maximum(1.0 - cos, 0.0), 0.0)
+    count = same.sum(axis=1)
+    bend[rows] = np.where(count > 0, np.sqrt(square.sum(axis=1) / np.maximum(count, 1)), 0.5 * np.pi)
+    return bend
 
 
 def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns:
@@ -289,6 +308,7 @@ def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> C
         "material": np.zeros(n, dtype=np.uint16),
         "footprint": np.zeros((n, 2, 3)),
         "patch": np.zeros(n),
+        "bend": np.zeros(n),
         "joined": np.zeros((n, 4), dtype=np.bool_),
         "speckle": np.zeros(n, dtype=np.complex128),
         "jitter": np.zeros((n, 2)),
