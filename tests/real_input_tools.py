@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -119,9 +119,19 @@ class Lock:
         return f"{head}; on it: {rows or 'nothing'}"
 
 
-def cell_noise_w(profile: srt.RadarProfile) -> float:
-    """Return the noise left in the whole cube's coherent sum over samples, chirps and channels [W]."""
-    return profile.noise_power_w / (profile.waveform.samples * profile.waveform.chirps * profile.n_virtual)
+def own_snr_db(frame: srt.Frame, object_id: int) -> float:
+    """Return an object's own SNR: its strongest beamformed cell, alone and noise-free, over the noise of that cell.
+
+    This is what ``snr_db`` of a detection on it means. The power summed over the object lies higher where the object
+    fills several cells, and says nothing of how this frame's speckle adds up.
+    """
+    returns, profile = frame.returns, frame.profile
+    mine = returns.object_id == object_id
+    rows = {f.name: getattr(returns, f.name)[mine] for f in fields(returns) if np.ndim(getattr(returns, f.name))}
+    alone = srt.synthesize(replace(returns, **rows), profile, noise=None, accuracy=1e-3)
+    cube = srt.process(alone)
+    noise = frame.cube.noise_power_w / len(cube.azimuth_channels)
+    return float(10 * np.log10(cube.range_azimuth.max() / noise))
 
 
 def locks(frame: srt.Frame) -> dict[int, Lock]:
@@ -134,7 +144,7 @@ def locks(frame: srt.Frame) -> dict[int, Lock]:
     p, rows, table = frame.profile, frame.scatterers, frame.detections.table
     beam, v_span = 2 / len(frame.cube.azimuth_channels), 2 * p.max_velocity_mps
     out = {}
-    for key, power in frame.returns.power_by_object().items():
+    for key in frame.returns.power_by_object():
         mine = rows.object_id == key
         if key == 0 or not mine.any():
             continue
@@ -149,7 +159,7 @@ def locks(frame: srt.Frame) -> dict[int, Lock]:
         on &= np.abs(off) < half + frame.cube.velocity_step_mps
         out[key] = Lock(
             key,
-            float(10 * np.log10(max(power, 1e-300) / cell_noise_w(p))),
+            own_snr_db(frame, key),
             (float(distance.min()), float(distance.max())),
             (float(np.arcsin(sine.min())), float(np.arcsin(sine.max()))),
             (float(rate.min()), float(rate.max())),

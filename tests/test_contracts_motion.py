@@ -85,8 +85,7 @@ def test_chrono_sedan_is_detected_from_most_sides(shared_data: Path) -> None:
     for time in TIMES:
         lock = locks(turn(time, "awrl1432", shared_data))[101]
         seen.append(101 in lock.found["object_id"])
-        # the sum over the whole car shares itself among the bins the car fills: 5 dB are the difference
-        assert seen[-1] or lock.snr_db < 20.0, str(lock)
+        assert seen[-1] or lock.snr_db < 15.0, str(lock)
     assert sum(seen) >= 5, seen
 
 
