@@ -126,9 +126,12 @@ def interior(
     """
     cos = np.abs(_dot(direction, normal))
     half = np.sqrt(np.minimum(_dot(edges[:, 0], edges[:, 0]), _dot(edges[:, 1], edges[:, 1])))
-    slope = 2.0 * wavenumber * distance * np.sqrt(np.maximum(1.0 - cos**2, 0.0)) * half
-    # three times: from the centre of a cell to its edge the measure changes by less than that
-    zero: BoolArray = joined.all(axis=1) & (slope > 3.0 * _SETTLED * cos)
+    sine = np.sqrt(np.maximum(1.0 - cos**2, 0.0))
+    # from the centre of a cell to its edge r tan(theta) changes by less than this factor
+    with np.errstate(divide="ignore"):
+        margin = 1.0 + 3.0 * half * (1.0 / cos + 1.0 / sine)
+    slope = 2.0 * wavenumber * distance * sine * half
+    zero: BoolArray = joined.all(axis=1) & (slope > margin * _SETTLED * cos)
     return zero
 
 
