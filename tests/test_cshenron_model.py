@@ -11,8 +11,9 @@ import pytest
 from shenron_rt import InputError, Pose, illuminate
 from shenron_rt.cshenron import ShenronRadarModel, range_angle
 from shenron_rt.cshenron.model import NOISE_COUNTS
-from shenron_rt.cshenron.place import LidarGrid, place_points
+from shenron_rt.cshenron.place import place_points
 from shenron_rt.echo.shenron import ShenronModel
+from shenron_rt.lidar.grid import LidarGrid
 
 VEHICLE = 10  # CARLA up to 0.9.13
 #: Corrected, without the noise that a lone patch of metal seen aslant drowns in.
@@ -101,7 +102,7 @@ def test_brightness_follows_the_grid_that_is_stated_not_the_number_of_points() -
                               np.cos(np.radians(el)) * np.sin(np.radians(az)), np.sin(np.radians(el))])  # fmt: skip
         xyz = (r * direction).reshape(3, -1).T + np.array([0.0, 0.0, 2.5])
         wall = np.column_stack([xyz, direction[0].ravel(), np.full(len(xyz), 3), np.full(len(xyz), 11), 0 * xyz[:, 0]])
-        model = ShenronRadarModel("ti_cascade", "corrected", grid=LidarGrid(step, step))
+        model = ShenronRadarModel("ti_cascade", "corrected", grid=LidarGrid(2, step, 0.0, step))
         echoes = illuminate(model.scatterers(wall), model.profile, model=model.model)
         powers.append(float(np.sum(np.abs(echoes.amplitude) ** 2)))
     assert 10 * np.log10(powers[1] / powers[0]) == pytest.approx(0.0, abs=0.1)  # the contract has 0.5 dB

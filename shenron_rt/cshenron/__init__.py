@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from .dsp import cartesian_image, cfar, doppler_slice, fblr, range_angle, view_mask
 from .model import ShenronRadarModel
-from .place import LidarGrid
 
 __all__ = [
-    "LidarGrid", "ShenronRadarModel", "cartesian_image", "cfar", "doppler_slice", "fblr", "range_angle", "view_mask",
+    "ShenronRadarModel", "cartesian_image", "cfar", "doppler_slice", "fblr", "range_angle", "view_mask",
 ]  # fmt: skip

@@ -13,13 +13,14 @@ from ..echo._shenron_loss import released_loss
 from ..echo.shenron import ShenronModel
 from ..errors import InputError
 from ..frames import Pose
+from ..lidar.grid import LidarGrid
 from ..randomness import frame_generator
 from ..returns import illuminate
 from ..scatterers import Scatterers
 from ..synthesis import synthesize
 from . import dsp
 from .layout import VIEWS_DEG, view_points
-from .place import DEFAULT_MOUNTS, LidarGrid, place_points
+from .place import DEFAULT_GRID, DEFAULT_LIDAR, DEFAULT_MOUNTS, place_points
 from .radar import ReleasedRadar
 from .synthesis import synthesize_released
 
@@ -44,8 +45,10 @@ class ShenronRadarModel:
         Numbering of the tags in the points; the released table knows ``"0.9.13"`` only.
     mounts : mapping of int to Pose, optional
         The radar of each view in the ego frame (x forward, y left), by view [deg]; default: two bumpers and two sides.
-    grid : LidarGrid, optional
-        The LiDAR behind the points; default: that of C-Shenron.
+    grid : LidarGrid
+        The LiDAR behind the points, which gives each its surface; default: that of C-Shenron.
+    lidar : Pose
+        It in the ego frame.
     seed : int
         Of noise and phases.
 
@@ -69,7 +72,8 @@ class ShenronRadarModel:
         *,
         tags: str = "0.9.13",
         mounts: Mapping[int, Pose] | None = None,
-        grid: LidarGrid | None = None,
+        grid: LidarGrid = DEFAULT_GRID,
+        lidar: Pose = DEFAULT_LIDAR,
         seed: int = 0,
     ) -> None:
         self.profile = profile if isinstance(profile, RadarProfile) else load_profile(profile)
@@ -83,7 +87,7 @@ class ShenronRadarModel:
                 f"profile {self.profile.name!r}: images need antennas in one horizontal line, half a wavelength apart; "
                 "take a profile with array.line, or shenron_rt.process for the map of any array"
             )
-        self.tags, self.grid, self.seed = tags, grid or LidarGrid(), seed
+        self.tags, self.grid, self.lidar, self.seed = tags, grid, lidar, seed
         self.mounts = dict(DEFAULT_MOUNTS if mounts is None else mounts)
 
     @property
@@ -96,7 +100,7 @@ class ShenronRadarModel:
         if self.model.mount and view not in self.mounts:
             raise InputError(f"no mount for view {view}; mounts are given for {sorted(self.mounts)}")
         mount = self.mounts[view] if self.model.mount else Pose(ypr_deg=(-float(view), 0.0, 0.0))
-        placed = place_points(points, mount, tags=self.tags, grid=self.grid, own_car=self.model.mount)
+        placed = place_points(points, mount, tags=self.tags, grid=self.grid, lidar=self.lidar, own_car=self.model.mount)
         return replace(placed, seed=self.seed, frame=frame, radar=f"view{view}")
 
     def __call__(self, points: ArrayLike, *, view: int = 0, frame: int = 0) -> ComplexArray:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
-from .._typing import ArrayLike, FloatArray
+from .._typing import ArrayLike
 from ..errors import InputError
 from ..frames import Pose
+from ..lidar.grid import LidarGrid, surface_area
 from ..scatterers import Scatterers
 from ..tags import tag_table
 from .layout import NEAR_M, check_points
 
-__all__ = ["DEFAULT_MOUNTS", "LidarGrid", "place_points"]
+__all__ = ["DEFAULT_GRID", "DEFAULT_LIDAR", "DEFAULT_MOUNTS", "place_points"]
 
 #: Front bumper, right side, rear bumper, left side of a car in the ego frame (x forward, y left), by view [deg].
 DEFAULT_MOUNTS = {
@@ -25,50 +23,20 @@ DEFAULT_MOUNTS = {
 }
 #: The own car, centred on its reference point: length and width [m]. Points in it are dropped.
 OWN_CAR_M = (5.0, 2.2)
-#: A recorded cosine is not taken for smaller; the surface of a point is its cross-section over this.
-SMALLEST_COSINE = 1e-3
-
-
-@dataclass(frozen=True)
-class LidarGrid:
-    """Angular grid of the LiDAR behind the points, which gives each its surface.
-
-    The default is C-Shenron's sensor: 64 channels over 40 degrees, 600 000 points a second at 10 turns a second.
-
-    Parameters
-    ----------
-    azimuth_step_deg, elevation_step_deg : float
-        Between neighbouring points; of merged sweeps the step of one.
-    xyz : (3,) sequence of float
-        The LiDAR in the ego frame [m].
-    """
-
-    azimuth_step_deg: float = 360.0 * 64 * 10 / 600_000
-    elevation_step_deg: float = 40.0 / 63
-    xyz: tuple[float, float, float] = (0.0, 0.0, 2.5)
-
-    def cross_section(self, position: FloatArray) -> FloatArray:
-        """Return the surface each point stands for, as seen from the LiDAR.
-
-        Parameters
-        ----------
-        position : (n, 3) float
-            Ego frame, x forward, y left, z up [m].
-
-        Returns
-        -------
-        (n,) float
-            R^2 dOmega [m^2].
-        """
-        offset = position - np.asarray(self.xyz, dtype=np.float64)
-        steps = math.radians(self.azimuth_step_deg) * math.radians(self.elevation_step_deg)
-        # R^2 cos(elevation) is R times the distance on the ground
-        area: FloatArray = np.linalg.norm(offset, axis=1) * np.hypot(offset[:, 0], offset[:, 1]) * steps
-        return area
+#: C-Shenron's LiDAR: 64 channels from 10 to -30 degrees, 600 000 points a second at 10 turns a second.
+DEFAULT_GRID = LidarGrid(64, 10.0, -30.0, 360.0 * 64 * 10 / 600_000)
+#: Where it is in the ego frame [m].
+DEFAULT_LIDAR = Pose((0.0, 0.0, 2.5))
 
 
 def place_points(
-    points: ArrayLike, mount: Pose, *, tags: str = "0.9.13", grid: LidarGrid | None = None, own_car: bool = True
+    points: ArrayLike,
+    mount: Pose,
+    *,
+    tags: str = "0.9.13",
+    grid: LidarGrid = DEFAULT_GRID,
+    lidar: Pose = DEFAULT_LIDAR,
+    own_car: bool = True,
 ) -> Scatterers:
     """Bring C-Shenron's points before a mounted radar.
 
@@ -81,8 +49,10 @@ def place_points(
         The radar in the ego frame (x forward, y left, z up).
     tags : str
         Numbering of the tags, as for :func:`shenron_rt.tags.tag_table`.
-    grid : LidarGrid, optional
-        Default: that of C-Shenron's LiDAR.
+    grid : LidarGrid
+        Of the LiDAR behind the points, which gives each its surface; of merged sweeps the grid of one.
+    lidar : Pose
+        That LiDAR in the ego frame.
     own_car : bool
         Drop the points on the own vehicle.
 
@@ -101,7 +71,7 @@ def place_points(
         raise InputError("column 4 is the object id, a whole number from 0 to 4294967295; were its bits cast to float?")
     ego = rows[:, :3] * [1.0, -1.0, 1.0]
     position, cosine = mount.apply_inverse(ego), np.abs(rows[:, 3])
-    area = (grid or LidarGrid()).cross_section(ego) / np.maximum(cosine, SMALLEST_COSINE)
+    area = surface_area(grid, lidar.apply_inverse(ego), cosine)
     keep = position[:, 0] > NEAR_M
     if own_car:
         keep &= np.any(np.abs(ego[:, :2]) > np.array(OWN_CAR_M) / 2, axis=1)
