@@ -63,6 +63,7 @@ def table(scatterers: Callable[[srt.Pose], srt.Scatterers], profile: srt.RadarPr
 
 
 def main() -> None:
+    """Read or trace a frame and print its table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--lidar", type=Path, help="frame of a semantic LiDAR; default: trace the scene braking")
     parser.add_argument("--side-file", type=Path, help="sensor pose and actors of that frame")
