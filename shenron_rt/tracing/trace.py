@@ -19,6 +19,7 @@ from ..scatterers import Scatterers
 from ..scene.motion import body_state
 from ..scene.world import World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
+from .advice import advise_thin
 from .backend import choose_backend
 from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
@@ -120,6 +121,7 @@ def trace(
     world, caster = _prepared(scene, mount, time + profile.frame_mid_s, choose_backend(backend))
 
     aimed = _aims(world, run_seed, frame, mount.name)
+    advise_thin(world, profile.pattern, pattern_cells(profile.pattern, rays).spacing, aimed)
     launches = [_launch_pattern(profile, rays, run_seed, frame, mount.name), *aimed.values()]
     drawn = [pool().submit(launch.draw) for launch in launches]  # while the rays are under way
     parts, hits = _cast(world, caster, launches, list(aimed))
