@@ -102,7 +102,7 @@ def read_ti_tlv(path: str | os.PathLike[str], *, cpu_hz: float | None = None) ->
     ------
     NotFoundError
     InputError
-        No packet in the file.
+        No packet in the file, or none that can be read: other demos have other headers.
     """
     file = Path(path)
     try:
@@ -124,6 +124,11 @@ def read_ti_tlv(path: str | os.PathLike[str], *, cpu_hz: float | None = None) ->
         used += length
     if not frames and not damaged:
         raise InputError(f"{file}: no TI packet in it, the magic word 02 01 04 03 06 05 08 07 does not occur")
+    if not frames:
+        raise InputError(
+            f"{file}: none of {damaged} packets reads as the out-of-box demo's (header of 40 bytes, points of type 1 or "
+            "301); is it the log of another demo?"
+        )
     if damaged:
         _log.warning("%s: %d damaged packets skipped, %d read", file, damaged, len(frames))
     if cpu_hz is not None:
