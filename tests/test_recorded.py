@@ -120,9 +120,8 @@ def test_no_bytes_make_the_reader_fail_otherwise_than_said(
     content = path.read_bytes()
     path.write_bytes(content[:cut] + noise + content[cut:])
     read = read_ti_tlv(path)
-    assert len(read) >= 4  # an insertion spoils at most the packet it falls into, and the one whose magic it forges
-    numbers = [f.frame for f in read.frames]
-    assert numbers == sorted(set(numbers) & set(range(100, 106)))
+    # there is no checksum: the packet that the bytes fall into may be lost or changed, every other one is read
+    assert len({f.frame for f in read.frames} & set(range(100, 106))) >= 5
 
 
 def test_time_unwraps_the_cycle_counter(tmp_path: Path) -> None:
@@ -144,7 +143,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     # the area scanner puts two more words into its header; its points are range, azimuth, elevation
     whole = packet((1, struct.pack("<4f", 1, 0.9, 0.3, 0)))
     (tmp_path / "other.dat").write_bytes(whole[:40] + struct.pack("<2I", 0, 1) + whole[40:-8])
-    with pytest.raises(InputError, match="none of 1 packets .* another demo"):
+    with pytest.raises(InputError, match=r"none of 1 packets .* another demo"):
         read_ti_tlv(tmp_path / "other.dat")
 
 

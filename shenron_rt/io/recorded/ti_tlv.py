@@ -126,8 +126,8 @@ def read_ti_tlv(path: str | os.PathLike[str], *, cpu_hz: float | None = None) ->
         raise InputError(f"{file}: no TI packet in it, the magic word 02 01 04 03 06 05 08 07 does not occur")
     if not frames:
         raise InputError(
-            f"{file}: none of {damaged} packets reads as the out-of-box demo's (header of 40 bytes, points of type 1 or "
-            "301); is it the log of another demo?"
+            f"{file}: none of {damaged} packets reads as the out-of-box demo's (header of 40 bytes, points of type 1 "
+            "or 301); is it the log of another demo?"
         )
     if damaged:
         _log.warning("%s: %d damaged packets skipped, %d read", file, damaged, len(frames))
