@@ -130,14 +130,18 @@ def causes(place: srt.Scene, mesh: Powers, seeds: int) -> list[tuple[str, list[f
     ]
 
 
-def channels_table(place: srt.Scene, seeds: int) -> list[tuple[str, list[float]]]:
-    """Return brightness against that at 512 channels, from a roof LiDAR of +10 to -30 degrees."""
+def channels_table(place: srt.Scene, seeds: int, model: str) -> list[tuple[str, list[float]]]:
+    """Return the sum of all |a|^2 against that at 512 channels, from a roof LiDAR of +10 to -30 degrees."""
 
     def power(channels: int) -> Powers:
-        step = 40.0 / (channels - 1)
-        return mean(
-            lambda s: through_lidar(place, lidar_at(ROOF, channels, step, s, upper=10.0, lower=-30.0), s), seeds
-        )
+        def one(seed: int) -> Powers:
+            mount = lidar_at(ROOF, channels, 0.4, seed, upper=10.0, lower=-30.0)
+            rows = lidar_scatterers(srt.cast_lidar(place, mount, normals=True), PROFILE, RADAR, seed=seed)
+            returns = srt.illuminate(rows, PROFILE, model=model)
+            level = np.abs(returns.amplitude) ** 2
+            return {i: float(level[returns.object_id == i].sum()) for i in NAMES}
+
+        return mean(one, seeds)
 
     powers = {channels: power(channels) for channels in (64, 128, 256, 512)}
     return [(f"{channels} channels", decibels(found, powers[512])) for channels, found in powers.items()]
@@ -174,7 +178,8 @@ def main() -> None:
     curve = convergence(place, mesh, densities, options.seeds)
     show("density, LiDAR over mesh [dB]", [(f"{d}x", row) for d, row in zip(densities, curve, strict=True)])
     show("cause, over the mesh door's incoherent power [dB]", causes(place, mesh, options.seeds))
-    show("roof LiDAR, over 512 channels [dB]", channels_table(place, options.seeds))
+    for model in ("physical", "shenron", "shenron:as_released"):
+        show(f"{model}: roof LiDAR, over 512 channels [dB]", channels_table(place, options.seeds, model))
     if options.write:
         picture(densities, curve, ROOT / "docs" / "images" / "lidar_convergence.png")
 

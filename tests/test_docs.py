@@ -115,7 +115,7 @@ def test_commands_in_the_docs_exist() -> None:
     from shenron_rt.cli import build_app
 
     text = "".join(p.read_text(encoding="utf-8") for p in PAGES)
-    verbs = set(re.findall(r"shenron-rt ([a-z]+)\b", text))
+    verbs = set(re.findall(r"shenron-rt ([a-z]+(?:-[a-z]+)*)\b", text))
     assert {"run", "doctor", "resolve", "validate", "profiles", "materials", "process"} <= verbs
     assert verbs <= {name for name in build_app() if not name.startswith("-")}
 
@@ -196,5 +196,5 @@ def test_command_lines_of_the_docs_parse(line: str) -> None:
     from shenron_rt.cli import build_app
 
     command, bound, *_ = build_app().parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
-    assert command.__name__ == line.split()[1]
+    assert command.__name__ == line.split()[1].replace("-", "_")
     assert isinstance(bound.arguments, dict)
