@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.integrate import dblquad
 
+import shenron_rt as srt
 from shenron_rt import InputError, Returns, Scatterers, SemanticTag, illuminate, load_profile
+from shenron_rt.cli import main
 from shenron_rt.config.profile import RadarProfile
 from shenron_rt.echo._shenron_lobe import lobe_solid_angle
 from shenron_rt.echo._shenron_loss import reflectance
@@ -266,3 +269,14 @@ def test_what_cannot_be_done_is_refused(profile: RadarProfile) -> None:
         illuminate(_point(), profile, model="shenron:as_released+true_angel")
     with pytest.raises(InputError, match="reference_range_m"):
         ShenronModel(reference_range_m=0.0)
+
+
+def test_a_run_takes_the_model_and_keeps_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    common = ["--no-pictures", "--model", "shenron:as_released"]
+    assert main(["run", "braking", *common, "--rays", "2000", "--backend", "scalar", "-o", "run"]) == 0
+    assert yaml.safe_load(Path("run/config.yaml").read_text())["run"]["model"] == "shenron:as_released"
+    returns = srt.Returns.load("run/radars/front/frame_000000/returns.npz")
+    assert returns.model == "shenron:as_released"
+    assert returns.coherent.all()
+    assert main(["run", "braking", "--model", "shenron:released", "-o", "other"]) == 2

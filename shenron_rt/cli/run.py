@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -49,6 +49,7 @@ def run(
     rays: int | None = None,
     backend: BackendName | None = None,
     accuracy: float | None = None,
+    model: str | None = None,
     pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
     json_: Json = False,
 ) -> int:
@@ -68,13 +69,15 @@ def run(
         Ray tracing backend. Default: auto (cuda, then llvm, then scalar).
     accuracy
         Of the ADC synthesis, relative to the RMS of the cube. Default: 1e-5.
+    model
+        Echo model: physical, shenron, shenron:as_released, with switches as in shenron:corrected-r4. Default: physical.
     """
     from .. import runs
     from ..config.scene import load_scene
 
     overrides = Overrides(set_)
     loaded = load_scene(scene, overrides.scene)
-    given = {"frames": frames, "rays": rays, "backend": backend, "accuracy": accuracy}
+    given = {"frames": frames, "rays": rays, "backend": backend, "accuracy": accuracy, "model": model}
     options = _options(loaded.run, given)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
@@ -102,9 +105,10 @@ class _Options:
     rays: int = 300_000
     backend: str = "auto"
     accuracy: float = 1e-5
+    model: str = "physical"
 
     def record(self) -> dict[str, Any]:
-        return {"frames": self.frames, "rays": self.rays, "backend": self.backend, "accuracy": self.accuracy}
+        return asdict(self)
 
 
 def _options(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> _Options:
@@ -175,6 +179,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
                     rays=options.rays,
                     backend=options.backend,
                     accuracy=options.accuracy,
+                    model=options.model,
                 )
                 folder = runs.frame_folder(root, mount.name, index)
                 runs.write_frame(folder, frame)
@@ -190,6 +195,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
         "backend": backends[0],
         "seed": scene.seed,
         "rays": options.rays,
+        "model": options.model,
         "radars": radars,
     }
 
