@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -303,3 +304,17 @@ def test_the_summary_counts_tags_actors_and_the_untagged(tmp_path: Path) -> None
     assert summary["untagged_share"] == pytest.approx(100 / len(records))
     assert summary["points_per_actor"] == {CAR_ID: int(np.sum(records["ObjIdx"] == CAR_ID))}  # 0 is not one object
     assert summary["velocity"].startswith("none")
+
+
+def test_side_files_of_the_docs_are_read(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "lidar.md").read_text(encoding="utf-8")
+    carla, own = re.findall(r"^```text\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    for text in (carla, own):
+        (tmp_path / "side.yaml").write_text(text)
+        side = read_side_file(tmp_path / "side.yaml")
+        assert side.actors[101].velocity.tolist() == [8.0, 0.0, 0.0]
+        assert side.actors[101].origin == pytest.approx((18.0, 0.0, 0.0))
+        assert side.ego_velocity is not None
+        assert side.ego_velocity.tolist() == [10.0, 0.0, 0.0]
+        assert side.sensor_pose is not None
+        assert side.sensor_pose.xyz == pytest.approx((0, 0, 2.4))
