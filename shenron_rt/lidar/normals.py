@@ -103,26 +103,30 @@ def _fit(frame: LidarFrame, rows: slice, index: IntArray, weight: FloatArray, fl
     total = np.maximum(weight.sum(axis=1), 1e-9)
     tangent = offset / size[..., None] * np.sqrt(weight / total[:, None])[..., None]
     spread = np.einsum("nki,nkj->nij", tangent, tangent)
-    c = frame.cos_incidence[rows, None]
+    c = frame.cos_incidence[rows]
     s = np.sqrt(np.maximum(1.0 - c**2, 0.0))
-
-    def normal_at(phi: FloatArray) -> FloatArray:
-        n: FloatArray = -c * u + s * (e1 * np.cos(phi)[:, None] + e2 * np.sin(phi)[:, None])
-        return n
-
-    def misfit(n: FloatArray) -> FloatArray:
-        q: FloatArray = np.einsum("ni,nij,nj->n", n, spread, n)
-        return q
-
+    # n.S.n as a function of phi is a trigonometric polynomial of the second degree
+    su, s1, s2 = (np.einsum("nij,nj->ni", spread, v) for v in (u, e1, e2))
+    fixed, lone1, lone2 = c**2 * _dot(u, su), -2.0 * c * s * _dot(u, s1), -2.0 * c * s * _dot(u, s2)
+    square1, square2, mixed = s**2 * _dot(e1, s1), s**2 * _dot(e2, s2), 2.0 * s**2 * _dot(e1, s2)
     angles = np.linspace(0.0, 2.0 * np.pi, _TURNS, endpoint=False)
-    cost = np.stack([misfit(normal_at(np.full(len(point), a))) for a in angles], axis=1)
-    normal = normal_at(_refined(cost, angles))
+    cos, sin = np.cos(angles), np.sin(angles)
+    terms = np.stack([lone1, lone2, square1, square2, mixed], axis=1)
+    cost = fixed[:, None] + terms @ np.stack([cos, sin, cos**2, sin**2, cos * sin])
+    phi = _refined(cost, angles)
+    normal = -c[:, None] * u + s[:, None] * (e1 * np.cos(phi)[:, None] + e2 * np.sin(phi)[:, None])
+    misfit = _dot(normal, np.einsum("nij,nj->ni", spread, normal))
     width = np.sqrt(np.maximum(np.linalg.eigvalsh(spread)[:, 1], 0.0))
     wide = width * (size * weight).sum(axis=1) / total > _WIDTH_M
     kept = (np.count_nonzero(weight > 1e-3, axis=1) >= _FEWEST) & wide & (width > 0.05)
-    kept &= np.sqrt(np.maximum(misfit(normal), 0.0)) < flatness
+    kept &= np.sqrt(np.maximum(misfit, 0.0)) < flatness
     fitted: FloatArray = np.where(kept[:, None], normal, 0.0)
     return fitted
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    product: FloatArray = np.einsum("ni,ni->n", a, b)
+    return product
 
 
 def _refined(cost: FloatArray, angles: FloatArray) -> FloatArray:
