@@ -11,8 +11,8 @@ from lidar_twin_tools import ROOF, street
 import shenron_rt as srt
 from shenron_rt.config.scene import LidarMount
 from shenron_rt.errors import InputError
-from shenron_rt.frames import direction
-from shenron_rt.lidar import lidar_scatterers, read_semantic_lidar
+from shenron_rt.frames import Pose, direction
+from shenron_rt.lidar import lidar_scatterers, merge_sweeps, read_semantic_lidar
 from shenron_rt.scene.motion import body_state
 from shenron_rt.tracing.backend import backend_status
 from shenron_rt.tracing.lidar import cast_at_radar, scan_pattern
@@ -146,6 +146,22 @@ def test_velocities_over_ground_are_finite_differences_of_the_scene(twin):
         np.testing.assert_allclose(twin.velocity[rows], velocity @ ego.rotation @ ROOF.pose.rotation, atol=1e-8)
     assert twin.ego_yaw_rate == pytest.approx(np.radians(30))
     np.testing.assert_allclose(twin.ego_velocity, direction(np.arctan2(3, 9) - np.radians(20), 0.0) * np.hypot(9, 3))
+
+
+def test_half_sweeps_of_a_moving_sensor_merge_onto_the_surfaces_they_hit():
+    scene, tick = street(lidars=[ROOF.model_copy(update={"points_per_second": 4 * 32 * 360 * 10})]), 0.05
+    earlier, now = (srt.cast_lidar(scene, time=k * tick, tick_s=tick, frame=k) for k in (1, 2))
+    then, here = (body_state(scene.ego.pose, (9, 3, 0), 30, k * tick) for k in (1, 2))
+    motion = Pose.from_matrix(here.rotation.T @ then.rotation, here.rotation.T @ (then.origin - here.origin))
+    merged = merge_sweeps(now, earlier, motion, elapsed_s=tick)
+    world = ROOF.pose.apply(merged.position) @ here.rotation.T + here.origin
+    assert set(np.unique(earlier.object_id)) | set(np.unique(now.object_id)) == {0, 40, 41, 101}
+    np.testing.assert_allclose(world[merged.object_id == 0][:, 2], 0, atol=1e-9)
+    assert np.hypot(*(world[merged.object_id == 41][:, :2] - [17, -2]).T) == pytest.approx(0.15, abs=0.003)
+    # a car that turns by 1 deg in the tick: its points move along their tangents, off by half the turn squared
+    car = body_state(scene.actors[0].pose, (-7, -2, 0), -20, 2 * tick)
+    own = (world[merged.object_id == 101] - car.origin) @ car.rotation
+    assert np.all(np.abs(own) < [2.6, 1.1, 1.7])
 
 
 # ---- the two doors with the same rays

@@ -143,8 +143,9 @@ def cast_lidar(
     Examples
     --------
     >>> import shenron_rt as srt
-    >>> scene = srt.load_scene("braking")
-    >>> points = srt.cast_lidar(scene, LidarMount(xyz_m=(0, 0, 2.5), range_m=80))  # doctest: +SKIP
+    >>> roof = {"xyz_m": (0, 0, 2.5), "range_m": 80, "points_per_second": 120_000}
+    >>> scene = srt.load_scene("braking", overrides={"lidars": [roof]})
+    >>> points = srt.cast_lidar(scene)  # doctest: +SKIP
     """
     mount = lidar_of(scene, lidar)
     if not 0 <= dropoff <= 1:
