@@ -10,6 +10,7 @@ import numpy as np
 from .._typing import ArrayLike, ComplexArray, FloatArray
 from ..config.profile import RadarProfile, load_profile
 from ..echo._shenron_loss import released_loss
+from ..echo._shenron_tables import released_material_of_tag
 from ..echo.shenron import ShenronModel
 from ..errors import InputError
 from ..frames import Pose
@@ -18,8 +19,9 @@ from ..randomness import frame_generator
 from ..returns import illuminate
 from ..scatterers import Scatterers
 from ..synthesis import synthesize
+from ..tags import tag_table
 from . import dsp
-from .layout import VIEWS_DEG, view_points
+from .layout import VIEWS_DEG, check_points, view_points
 from .place import DEFAULT_GRID, DEFAULT_LIDAR, DEFAULT_MOUNTS, place_points
 from .radar import ReleasedRadar
 from .synthesis import synthesize_released
@@ -42,7 +44,8 @@ class ShenronRadarModel:
         :meth:`~shenron_rt.echo.shenron.ShenronModel.parse` reads: the formulas corrected, through the synthesis of
         this package.
     tags : str
-        Numbering of the tags in the points; the released table knows ``"0.9.13"`` only.
+        Numbering of the tags in the points. The released table is written for ``"0.9.13"``; others come to it by what
+        they mean.
     mounts : mapping of int to Pose, optional
         The radar of each view in the ego frame (x forward, y left), by view [deg]; default: two bumpers and two sides.
     grid : LidarGrid
@@ -78,10 +81,7 @@ class ShenronRadarModel:
     ) -> None:
         self.profile = profile if isinstance(profile, RadarProfile) else load_profile(profile)
         self.model = preset if isinstance(preset, ShenronModel) else ShenronModel.parse(preset)
-        if self.released and tags not in ("0.9.10", "0.9.11", "0.9.12", "0.9.13"):
-            raise InputError(
-                f"tags {tags!r}: the released tag table knows 0.9.10 to 0.9.13; preset='corrected' has all"
-            )
+        tag_table(tags)  # refuses an unknown name
         if not self.released and not _is_line(self.profile):
             raise InputError(
                 f"profile {self.profile.name!r}: images need antennas in one horizontal line, half a wavelength apart; "
@@ -140,7 +140,11 @@ class ShenronRadarModel:
         return adc
 
     def _released(self, points: ArrayLike, view: int) -> ComplexArray:
-        kept, radar = view_points(points, view), ReleasedRadar.of(self.profile)
+        material = None
+        if tag_table(self.tags) is not tag_table("0.9.13"):  # the released table, by what the tags mean
+            numbers = check_points(points)[:, 5].astype(np.int64)
+            material = released_material_of_tag(tag_table(self.tags).translate(numbers))
+        kept, radar = view_points(points, view, material), ReleasedRadar.of(self.profile)
         loss = released_loss(kept.cosine, kept.polar_angle, kept.material, radar.start_hz)
         return synthesize_released(radar, kept.rho, kept.theta, loss)  # the released code sets the speed to zero
 
