@@ -63,7 +63,17 @@ def test_a_run_folder_like_that_of_a_scene_is_written(folder: Path, capsys: pyte
 
 
 def test_the_same_numbers_as_in_python(folder: Path) -> None:
-    options = ("--side-file", "moving.yaml", "--mount", BEHIND, "--profile", "awrl1432_137mhz", "--no-pictures", "-o", "run")
+    options = (
+        "--side-file",
+        "moving.yaml",
+        "--mount",
+        BEHIND,
+        "--profile",
+        "awrl1432_137mhz",
+        "--no-pictures",
+        "-o",
+        "run",
+    )
     assert _run(*options) == 0
     lidar = srt.read_semantic_lidar("frame.bin", tag_table="0.9.14", frame="carla", side_file="moving.yaml")
     done = srt.simulate(lidar, srt.load_profile("awrl1432_137mhz"), mount=srt.Pose((2.0, -3.0, 1.0)))
@@ -101,6 +111,19 @@ def test_several_files_are_frames_with_a_side_file_each(folder: Path, capsys: py
     assert rates[1].min() == pytest.approx(-10, abs=0.1)
     assert main([*argv, "--frames", "1:2", "-o", "one"]) == 0
     assert [f["frame"] for f in json.loads(capsys.readouterr().out)["radars"][0]["frames"]] == [1]
+
+
+def test_short_ranges_and_half_sweeps_are_pointed_out(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _run("--sensor-pose", "0,0,2.4", "--no-pictures") == 0
+    whole = capsys.readouterr().out
+    assert "of 360 deg\n" in whole
+    assert "default range" not in whole
+    records = street(reach_m=10.0)
+    write_bin(folder / "frame.bin", records[records["y"] > 0])
+    assert _run("--sensor-pose", "0,0,2.4", "--no-pictures") == 0
+    short = capsys.readouterr().out
+    assert "over 180 of 360 deg; a part of a sweep" in short
+    assert "10 m is CARLA's default range" in short
 
 
 def test_crops_thinning_and_normals_are_named_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

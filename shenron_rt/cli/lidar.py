@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["lidar"]
 
 _MOUNT = "2,0,1"
+#: Of ``sensor.lidar.ray_cast_semantic``; a frame that ends there was seldom meant to [m].
+_DEFAULT_RANGE_M = 10.0
 
 
 @dataclass(frozen=True)
@@ -299,6 +301,13 @@ def _show(item: Mapping[str, Any]) -> None:
         f"untagged {100 * item['untagged_share']:.1f} %"
     )
     say(f"grid: {item['grid']}")
+    short = (
+        f"; {_DEFAULT_RANGE_M:g} m is CARLA's default range, is it meant?"
+        if item["reach_m"] <= _DEFAULT_RANGE_M
+        else ""
+    )
+    part = "; a part of a sweep, merge_sweeps joins them" if item["azimuth_covered_deg"] < 330 else ""
+    say(f"reach: {item['reach_m']:.1f} m over {item['azimuth_covered_deg']:.0f} of 360 deg{part}{short}")
     say(
         f"incidence: {door['cosine_from_normal']} points from estimated normals as the radar sees them "
         f"({door['facing_away_from_the_radar']} face away), {door['cosine_recorded']} as the LiDAR recorded it; "

@@ -180,12 +180,19 @@ class LidarFrame:
             "names": {int(i): self.names[int(i)] for i in ids if int(i) in self.names},
             "untagged_share": histogram.get("Unlabeled", 0) / n,
             "grid": str(self.grid),
+            "reach_m": float(np.linalg.norm(self.position, axis=1).max(initial=0.0)),
+            "azimuth_covered_deg": self._azimuth_covered_deg(),
             "cosines_clipped": self.n_clipped,
             "areas_limited": int(np.sum(self.cos_incidence < MIN_AREA_COS)),
             "normals": 0 if self.normal is None else int(np.any(self.normal != 0, axis=1).sum()),
             "velocity": self._velocity_source(),
             "notes": list(self.notes),
         }
+
+    def _azimuth_covered_deg(self) -> float:
+        """Return how much of the circle has points, in sectors of 5 degrees."""
+        azimuth = np.degrees(np.arctan2(self.position[:, 1], self.position[:, 0]))
+        return 5.0 * len(np.unique(np.floor(azimuth / 5.0).astype(np.int64) % 72))
 
     def _velocity_source(self) -> str:
         if self.velocity is not None:
