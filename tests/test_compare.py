@@ -203,6 +203,38 @@ def test_the_ways_of_not_seeing_are_told_apart() -> None:
         assert next(o for o in srt.compare(mesh, lidar).objects if o.id == 7).cause == cause
 
 
+def test_half_hidden_and_half_out_of_view_takes_both_causes() -> None:
+    left, right = (patch(7, (20.0, y, 0.0), seed=s) for y, s in ((0.0, 0), (15.0, 1)))
+    mesh = frame_of(scatterers_of(left, right))
+    record = next(o for o in srt.compare(mesh, roof_view(patch(40, (10.0, 0.0, 0.5), size=3.0))).objects if o.id == 7)
+    # each share is near 0.5, so either alone may fall short of a half
+    assert set(causes(record)) <= {"hidden_from_lidar", "outside_lidar_view"}
+    assert record.sight.behind_other + record.sight.no_ray > 0.95
+
+
+def test_metal_without_a_mirror_point_is_seen_and_gives_nothing() -> None:
+    mesh = frame_of(scatterers_of(patch(7, AT, material="concrete")))
+    lidar = roof_view(patch(7, AT, material="metal"))
+    record = only_object(mesh, lidar)
+    assert (record.seen_by, record.cause, record.rows_b) == ("a", "mirror_part", ROWS)
+
+
+def test_tags_carry_causes_too() -> None:
+    mesh = frame_of(scatterers_of(wall_before(30.0), patch(7, AT, tag=SemanticTag.Car)))
+    by_tag = {t.tag: t for t in srt.compare(mesh, roof_view(wall_before(10.0))).tags}
+    assert (by_tag["Car"].seen_by, by_tag["Car"].cause) == ("a", "hidden_from_lidar")
+    assert list(by_tag["Car"].sight.occluders) == ["Walls"]
+    assert by_tag["Walls"].delta_db == pytest.approx(sum(by_tag["Walls"].terms_db.values()), abs=1e-9)
+
+
+def test_rows_that_neither_pattern_lights_are_no_area() -> None:
+    behind = patch(0, (-20.0, 0.0, 0.0), area=500.0)
+    a, b = frame_of(scatterers_of(patch(0, AT))), roof_view(patch(0, AT), behind)
+    record = only_object(a, b)
+    assert record.area_m2_b == pytest.approx(record.area_m2_a)
+    assert record.cause == "agrees"
+
+
 def test_without_the_lidars_place_nothing_is_said_to_be_hidden_from_it() -> None:
     mesh = frame_of(scatterers_of(patch(7, AT)))
     lidar = frame_of(scatterers_of(wall_before(10.0), door="lidar"))

@@ -108,8 +108,11 @@ def _show(result: Comparison) -> None:
     )
     _table(
         "Tags",
-        ("tag", "A [dBm]", "B [dBm]", "B - A [dB]"),
-        [(r["tag"], _dbm(r["power_db_a"]), _dbm(r["power_db_b"]), _text(r["delta_db"])) for r in result.tags],
+        ("tag", "A [dBm]", "B [dBm]", "B - A [dB]", "cause"),
+        [
+            (r["tag"], _dbm(r["power_db_a"]), _dbm(r["power_db_b"]), _text(r["delta_db"]), r.get("cause"))
+            for r in result.tags
+        ],
     )
     maps = [
         (

@@ -35,6 +35,7 @@ from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED
 from ..echo.glint import glint_sigma0
 from ..echo.link import link_amplitude
+from ..frames import spherical
 from ..scatterers import Scatterers
 from .sides import Side
 
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
 __all__ = ["Budget", "Grouping", "Palette", "budget_of", "received", "terms_db"]
 
 _POINT = "(given RCS)"
+#: Two-way pattern down to which rays are cast; rows below it do not count as seen (power).
+_EDGE = 1e-4
 _GRID = np.linspace(0.0, 1.0, 1025)
 
 
@@ -169,7 +172,7 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     index = grouping.index(s)
     given = np.zeros(len(s), dtype=bool) if s.rcs is None else ~np.isnan(s.rcs)
     area = np.nan_to_num(np.zeros(len(s)) if s.area is None else s.area)
-    area = np.where(given, 0.0 if s.rcs is None else np.nan_to_num(s.rcs), area)
+    area = np.where(given, 0.0 if s.rcs is None else np.nan_to_num(s.rcs), area * _in_beam(s, common, own))
     total = grouping.sum(index, area)
     sigma, shares = _surfaces(side, grouping, index, np.where(given, 0.0, area), palette, keys)
     sigma = np.where(given, 1.0, sigma)
@@ -199,6 +202,12 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
         shares=shares,
         curves=curves,
     )
+
+
+def _in_beam(s: Scatterers, *profiles: RadarProfile) -> BoolArray:
+    """Return the rows that either pattern lights: a LiDAR sees all around, and what is behind the radar is no area."""
+    _, azimuth, elevation = spherical(s.position)
+    return np.asarray(np.any([p.pattern(azimuth, elevation) ** 2 >= _EDGE for p in profiles], axis=0))
 
 
 def _gain(profile: RadarProfile, s: Scatterers, *, weather: bool) -> FloatArray:
@@ -292,6 +301,10 @@ def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
 
 
+_NEPER_DB = 10 / math.log(10)
+_DIFFUSE = ("coverage", "incidence", "material", "surfaces", "range", "beam", "profile", "weather")
+
+
 def terms_db(
     a: tuple[Budget, float, float], b: tuple[Budget, float, float], group: int, *, same_model: bool
 ) -> dict[str, float] | None:
@@ -307,17 +320,35 @@ def terms_db(
     Returns
     -------
     dict of str to float or None
-        None where a side has nothing, or no area.
+        None where a side has nothing.
     """
     (x, p_a, c_a), (y, p_b, c_b) = a, b
     factors = ("area", "backscatter", "spread", "patterned", "profiled", "expected")
     values = [[float(getattr(budget, f)[group]) for f in factors] for budget in (x, y)]
-    if min(*values[0], *values[1], p_a, p_b) <= 0:
+    e_a, e_b = values[0][-1], values[1][-1]
+    m_a, m_b = c_a + float(x.mirror[group]), c_b + float(y.mirror[group])
+    if min(e_a + m_a, e_b + m_b, p_a, p_b) <= 0:
         return None
+    terms = dict.fromkeys(_DIFFUSE, 0.0)
+    whole = _log_mean(e_b + m_b, e_a + m_a)
+    if min(e_a, e_b) > 0:
+        weight = _log_mean(e_b, e_a) / whole if same_model else 1.0
+        terms = {name: value * weight for name, value in _diffuse_terms(x, y, values, group).items()}
+    elif same_model:  # metal has no diffuse part: on one side, or on both
+        terms["coverage"] = _NEPER_DB * (e_b - e_a) / whole
+    if not same_model:
+        return terms | {"model": _db(p_b / p_a) - sum(terms.values())}
+    terms["mirror"] = _NEPER_DB * (m_b - m_a) / whole
+    terms["speckle"] = _db(p_b / (e_b + m_b)) - _db(p_a / (e_a + m_a))
+    return terms
+
+
+def _diffuse_terms(x: Budget, y: Budget, values: list[list[float]], group: int) -> dict[str, float]:
+    """Return how the expected diffuse powers differ, factor by factor [dB]."""
     steps = [[_db(v[i + 1] / v[i]) for i in range(5)] for v in values]
     d_sigma, d_range, d_beam, d_profile, d_weather = (q - p for p, q in zip(*steps, strict=True))
     incidence, material = _incidence_and_material(x, y, group)
-    terms = {
+    return {
         "coverage": _db(values[1][0] / values[0][0]),
         "incidence": incidence,
         "material": material,
@@ -327,15 +358,6 @@ def terms_db(
         "profile": d_profile,
         "weather": d_weather,
     }
-    e_a, e_b = values[0][-1], values[1][-1]
-    if not same_model:
-        return terms | {"model": _db(p_b / e_b) - _db(p_a / e_a)}
-    m_a, m_b = c_a + float(x.mirror[group]), c_b + float(y.mirror[group])
-    whole = _log_mean(e_b + m_b, e_a + m_a)
-    terms = {name: value * _log_mean(e_b, e_a) / whole for name, value in terms.items()}
-    terms["mirror"] = 10 / math.log(10) * (m_b - m_a) / whole
-    terms["speckle"] = _db(p_b / (e_b + m_b)) - _db(p_a / (e_a + m_a))
-    return terms
 
 
 def _log_mean(x: float, y: float) -> float:

@@ -81,10 +81,9 @@ def compare_objects(a: Side, b: Side) -> list[Record]:
         return []
     pair = _Pair.of(a, b, "object_id")
     names = {**b.names, **a.names}
-    sights = {"a": _sight(a), "b": _sight(b)}
+    sights = {"a": _sight(a, "object_id"), "b": _sight(b, "object_id")}
     records = [_object(pair, group, a, b, names, sights) for group in range(len(pair.grouping.keys))]
-    kept = [r for r in records if r is not None]
-    return sorted(kept, key=lambda r: -max(r["power_db_a"] or -999.0, r["power_db_b"] or -999.0))
+    return _by_power([r for r in records if r is not None])
 
 
 def compare_tags(a: Side, b: Side) -> list[Record]:
@@ -92,35 +91,47 @@ def compare_tags(a: Side, b: Side) -> list[Record]:
     if a.returns is None and b.returns is None:
         return []
     pair = _Pair.of(a, b, "tag")
+    names = {int(tag): tag.name for tag in SemanticTag}
+    sights = {"a": _sight(a, "tag"), "b": _sight(b, "tag")}
     records = []
     for group, tag in enumerate(pair.grouping.keys):
-        p_a, p_b = (_level(p[group]) for p in pair.power)
-        if p_a is None and p_b is None:
-            continue
-        delta = None if p_a is None or p_b is None else p_b - p_a
-        record = Record(tag=SemanticTag(int(tag)).name, power_db_a=p_a, power_db_b=p_b, delta_db=delta)
-        records.append(_with_budget(record, pair, group))
-    return sorted(records, key=lambda r: -max(r["power_db_a"] or -999.0, r["power_db_b"] or -999.0))
+        record = Record(tag=SemanticTag(int(tag)).name, **_levels(pair, group))
+        if record["seen_by"] is not None:
+            record = _with_budget(record, pair, group)
+            records.append(_judge(record, pair, group, a, b, names, sights, many=True))
+    return _by_power(records)
+
+
+def _by_power(records: list[Record]) -> list[Record]:
+    return sorted(records, key=lambda r: -max(v for v in (r["power_db_a"], r["power_db_b"]) if v is not None))
+
+
+def _levels(pair: _Pair, group: int) -> dict[str, Any]:
+    """Return both levels, their difference, and who sees the group; None where nobody does."""
+    a, b = (_level(float(p[group])) for p in pair.power)
+    who = ("both" if b is not None else "a") if a is not None else "b" if b is not None else None
+    delta = None if a is None or b is None else b - a
+    return {"power_db_a": a, "power_db_b": b, "delta_db": delta, "seen_by": who}
 
 
 def _level(power: float) -> float | None:
     return 10 * math.log10(power) if power > 0 else None
 
 
-def _sight(side: Side) -> Sight | None:
+def _sight(side: Side, by: str) -> Sight | None:
     s = side.scatterers
     if s is None or side.origin is None:
         return None
     first = np.ones(len(s), dtype=bool) if s.bounces is None else s.bounces <= 1
-    return Sight(s.position[first], s.object_id[first], side.origin)
+    return Sight(s.position[first], getattr(s, by)[first], side.origin)
 
 
 def _object(
     pair: _Pair, group: int, a: Side, b: Side, names: dict[int, str], sights: dict[str, Sight | None]
 ) -> Record | None:
     number = int(pair.grouping.keys[group])
-    levels = [_level(p[group]) for p in pair.power]
-    if levels == [None, None]:
+    levels = _levels(pair, group)
+    if levels["seen_by"] is None:
         return None
     tags = [_tag(side, number) for side in (a, b)]
     record = Record(
@@ -129,16 +140,13 @@ def _object(
         tag=tags[0] or tags[1],
         tag_a=tags[0],
         tag_b=tags[1],
-        power_db_a=levels[0],
-        power_db_b=levels[1],
-        delta_db=None if None in levels else levels[1] - levels[0],  # type: ignore[operator]  # neither is None
-        seen_by="both" if None not in levels else "b" if levels[0] is None else "a",
+        **levels,
         detected_a=_detected(a, number),
         detected_b=_detected(b, number),
         position_m=_center(a, b, number),
     )
     record = _with_budget(record, pair, group)
-    return _judge(record, pair, group, a, b, names, sights)
+    return _judge(record, pair, group, a, b, names, sights, many=number == 0)
 
 
 def _with_budget(record: Record, pair: _Pair, group: int) -> Record:
@@ -160,32 +168,47 @@ def _with_budget(record: Record, pair: _Pair, group: int) -> Record:
 
 
 def _judge(
-    record: Record, pair: _Pair, group: int, a: Side, b: Side, names: dict[int, str], sights: dict[str, Sight | None]
+    record: Record,
+    pair: _Pair,
+    group: int,
+    a: Side,
+    b: Side,
+    names: dict[int, str],
+    sights: dict[str, Sight | None],
+    *,
+    many: bool,
 ) -> Record:
-    number, sides = record["id"], {"a": a, "b": b}
+    """Add the cause, and what was seen of the group from the side that has less of it."""
     poor = _poor_side(record)
-    rich = "b" if poor == "a" else "a"
-    seen = sides[rich].scatterers
-    look = sights[poor]
-    sight = None
-    if look is not None and seen is not None:
-        points = seen.position[(seen.object_id == number) & (True if seen.bounces is None else seen.bounces <= 1)]
-        sight = look.of(points[:: max(1, len(points) // _SIGHT_POINTS)], number, names) if len(points) else None
+    poor_side, rich_side = (a, b) if poor == "a" else (b, a)
+    sight = _seen(rich_side, int(pair.grouping.keys[group]), pair.grouping.by, sights[poor], names)
+    rows = int(record.get(f"rows_{poor}", 0))
     if record["delta_db"] is None:
-        poor_side = sides[poor]
-        cause = "not_simulated" if poor_side.returns is None else blind_verdict(poor_side.viewer, sight)
-        verdict = Record(cause=cause, also=[], meaning=CAUSES[cause])
+        causes = ["not_simulated"]
+        if poor_side.returns is not None:
+            causes = blind_verdict(poor_side.viewer, sight, rows, pair.same_model)
+        record.update(cause=causes[0], also=causes[1:], meaning=CAUSES[causes[0]])
     else:
         facts: dict[str, Any] = {
-            "rows_poor": record.get(f"rows_{poor}", 0),
+            "rows_poor": rows,
             "sight": sight,
-            "viewer_poor": sides[poor].viewer,
-            "tags_differ": record["tag_a"] != record["tag_b"],
+            "viewer_poor": poor_side.viewer,
+            "tags_differ": record.get("tag_a") != record.get("tag_b"),
+            "many": many,
         }
-        verdict = level_verdict(record["delta_db"], record["terms_db"], pair.fluctuation_db(group), facts)
-    record.update(verdict)
+        record.update(level_verdict(record["delta_db"], record["terms_db"], pair.fluctuation_db(group), facts))
     record["sight"] = None if sight is None else Record(sight, from_side=poor)
     return record
+
+
+def _seen(rich: Side, key: int, by: str, look: Sight | None, names: dict[int, str]) -> Record | None:
+    """Return what the poorer side's rays met on the way to the richer side's points of a group."""
+    s = rich.scatterers
+    if look is None or s is None:
+        return None
+    mine = getattr(s, by) == key
+    points = s.position[mine if s.bounces is None else mine & (s.bounces <= 1)]
+    return look.of(points[:: max(1, len(points) // _SIGHT_POINTS)], key, names) if len(points) else None
 
 
 def _poor_side(record: Record) -> str:

@@ -27,12 +27,13 @@ class Sight:
     ----------
     position : (n, 3) float
         Where the rays ended [m].
-    object_id : (n,) int
+    label : (n,) int
+        Object id, or tag, of what they met.
     origin : (3,) float
         Where they began [m].
     """
 
-    def __init__(self, position: FloatArray, object_id: IntArray, origin: FloatArray) -> None:
+    def __init__(self, position: FloatArray, label: IntArray, origin: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
         arm = position - origin
@@ -40,7 +41,7 @@ class Sight:
         seen = self._range > 0
         self._origin = origin
         self._range = self._range[seen]
-        self._object = object_id[seen].astype(np.int64)
+        self._label = label[seen].astype(np.int64)
         unit = arm[seen] / self._range[:, None]
         self._unit = unit
         self._tree = cKDTree(unit) if len(unit) else None
@@ -53,14 +54,14 @@ class Sight:
         distance = np.reshape(np.asarray(self._tree.query(self._unit[rays], k=k)[0]), (len(rays), k))[:, -1]
         return np.asarray(np.maximum(distance, _MIN_SPREAD_RAD)[back].reshape(ray.shape), dtype=np.float64)
 
-    def of(self, position: FloatArray, object_id: int, names: Mapping[int, str]) -> Record:
-        """Tell what the rays met on the way to some points of an object.
+    def of(self, position: FloatArray, label: int, names: Mapping[int, str]) -> Record:
+        """Tell what the rays met on the way to some points of an object, or of a tag.
 
         Returns
         -------
         Record
             Shares of the points, which add up to 1: ``seen``, ``behind_itself``, ``behind_other``, ``other_label`` (a
-            surface of another id in the same place), ``through`` (the ray went on behind the point), ``no_ray``; and
+            surface of another label in the same place), ``through`` (the ray went on behind the point), ``no_ray``; and
             ``occluders``, name -> share.
         """
         shares = dict.fromkeys(("seen", "behind_itself", "behind_other", "other_label", "through", "no_ray"), 0.0)
@@ -75,7 +76,7 @@ class Sight:
         weight = near / np.maximum(near.sum(axis=1), 1)[:, None] / len(position)
         gap = self._range[ray] - reach[:, None]
         same = np.abs(gap) <= np.maximum(_SAME_M, _SAME_SHARE * reach)[:, None]
-        own = self._object[ray] == object_id
+        own = self._label[ray] == label
         before = ~same & (gap < 0)
         kinds = {
             "seen": own & same, "behind_itself": own & before, "behind_other": ~own & before,
@@ -87,7 +88,7 @@ class Sight:
         return Record(shares, occluders=self._occluders(ray, weight, kinds["behind_other"], names))
 
     def _occluders(self, ray: IntArray, weight: FloatArray, mask: IntArray, names: Mapping[int, str]) -> Record:
-        ids, row = np.unique(self._object[ray[mask]], return_inverse=True)
+        ids, row = np.unique(self._label[ray[mask]], return_inverse=True)
         share = np.bincount(row, weight[mask], len(ids)) if len(ids) else np.zeros(0)
         order = np.argsort(-share)[:3]
         return Record({names.get(int(ids[i]), f"object {ids[i]}"): float(share[i]) for i in order if share[i] > 0})

@@ -55,6 +55,10 @@ _TERM_CAUSE = {
 }  # fmt: skip
 
 
+#: Terms that, of many things at once, only say that the sides see different ones.
+_WHICH_PART = ("coverage", "material", "surfaces", "range", "beam")
+
+
 def level_verdict(
     delta_db: float, terms: Mapping[str, float] | None, fluctuation_db: float, facts: Mapping[str, Any]
 ) -> Record:
@@ -65,11 +69,12 @@ def level_verdict(
     delta_db : float
         B over A.
     terms : mapping or None
-        Of :func:`shenron_rt.comparison.budget.terms_db`; they add up to ``delta_db``.
+        What it is made of, of :func:`shenron_rt.comparison.budget.terms_db`; they add up to ``delta_db``.
     fluctuation_db : float
         Standard deviation of ``delta_db`` by speckle.
     facts : mapping
-        ``rows_poor``, ``sight`` (of the side with less area onto the other's points), ``viewer_poor``, ``tags_differ``.
+        ``rows_poor``, ``sight`` (of the side with less area onto the other's points), ``viewer_poor``, ``tags_differ``,
+        ``many``: the group is many things (all that is static, a tag), of which each side may see others.
 
     Returns
     -------
@@ -81,6 +86,9 @@ def level_verdict(
         return _record("agrees", [], delta_db, 0.0, tolerance)
     if terms is None:
         return _record("unexplained", [], delta_db, 0.0, tolerance)
+    if facts.get("many"):
+        parts = sum(terms[k] for k in _WHICH_PART)
+        terms = {"coverage": parts} | {k: v for k, v in terms.items() if k not in _WHICH_PART}
     sign = math.copysign(1.0, delta_db)
     # a draw beyond its own spread is no explanation
     usable = {k: v for k, v in terms.items() if k != "speckle" or abs(v) <= tolerance}
@@ -119,8 +127,8 @@ def _cause(term: str, facts: Mapping[str, Any]) -> str:
     return "different_surfaces"
 
 
-def blind_verdict(viewer: str, sight: Mapping[str, Any] | None) -> str:
-    """Return why a side has no echo of an object that the other side sees.
+def blind_verdict(viewer: str, sight: Mapping[str, Any] | None, rows: int, same_model: bool) -> list[str]:
+    """Return why a side has no echo of an object that the other side sees: the causes that half of it needs.
 
     Parameters
     ----------
@@ -129,17 +137,27 @@ def blind_verdict(viewer: str, sight: Mapping[str, Any] | None) -> str:
     sight : mapping or None
         Of :meth:`shenron_rt.comparison.sight.Sight.of`, from that side onto the other's points; None where it is not
         known from where it looked.
+    rows : int
+        Scatterers of the object on that side: with some, its surface is seen but gives nothing.
+    same_model : bool
+        Both sides are ``physical``, where a surface without diffuse echo has its mirror part alone.
     """
+    if rows:
+        return ["mirror_part" if same_model else "model"]
     if sight is None:
-        return "unexplained"
+        return ["unexplained"]
     reasons = {
         f"hidden_from_{viewer}": sight["behind_other"],
         f"outside_{viewer}_view": sight["no_ray"],
         "other_label": sight["other_label"],
         "not_there": sight["through"],
     }
-    cause = max(reasons, key=lambda k: reasons[k])
-    return cause if reasons[cause] >= _REST else "unexplained"
+    causes: list[str] = []
+    for cause in sorted(reasons, key=lambda k: -reasons[k]):
+        causes.append(cause)
+        if sum(reasons[c] for c in causes) >= _HIDDEN:
+            return causes
+    return ["unexplained"]
 
 
 def _record(cause: str, also: list[str], delta_db: float, explained_db: float, tolerance_db: float) -> Record:
