@@ -6,6 +6,7 @@ import functools
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .config.profile import RadarProfile
 from .config.scene import RadarMount, Scene
@@ -18,6 +19,9 @@ from .returns import Returns, illuminate
 from .scatterers import Scatterers
 from .synthesis import AdcCube, synthesize
 from .tracing import trace
+
+if TYPE_CHECKING:
+    from .echo.shenron import ShenronModel
 
 __all__ = ["Frame", "simulate", "simulate_all"]
 
@@ -72,7 +76,7 @@ def simulate(
     frame: int = 0,
     rays: int = 300_000,
     max_bounces: int = 1,
-    model: str = "physical",
+    model: str | ShenronModel = "physical",
     noise: str | None = "thermal",
     mount: Pose | None = None,
     backend: str = "auto",
@@ -97,7 +101,7 @@ def simulate(
         Frame index; random numbers derive from (seed, frame, radar).
     rays, max_bounces, backend
         As for :func:`shenron_rt.trace`.
-    model : str
+    model : str or ShenronModel
         Echo model, as for :func:`shenron_rt.illuminate`.
     noise : str or None
         ``"thermal"``, or ``None`` for none.
@@ -158,7 +162,7 @@ def _processed(
     materials: str | os.PathLike[str],
     *,
     time: float,
-    model: str,
+    model: str | ShenronModel,
     noise: str | None,
     accuracy: float,
 ) -> Frame:

@@ -181,3 +181,13 @@ def test_points_of_the_wrong_form_are_refused() -> None:
     ):
         with pytest.raises(InputError, match=message):
             view_points(bad, 0)
+
+
+@pytest.mark.parametrize(("shape", "message"), [((3, 86), "dimensions"), ((2, 4, 64), "0, 0"), ((3, 4, 512), "256")])
+def test_cubes_the_released_processing_cannot_take_are_refused(shape: tuple[int, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        dsp.range_angle(np.ones(shape, dtype=complex))
+
+
+def test_one_chirp_is_enough_for_an_image() -> None:
+    assert dsp.range_angle(np.ones((1, 4, 256), dtype=complex)).max() == pytest.approx(4 * 127.5)  # sum of Hann(256)

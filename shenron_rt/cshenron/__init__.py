@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ..echo.shenron import ShenronModel
 from .dsp import cartesian_image, cfar, doppler_slice, fblr, range_angle, view_mask
 from .model import ShenronRadarModel
 
 __all__ = [
-    "ShenronRadarModel", "cartesian_image", "cfar", "doppler_slice", "fblr", "range_angle", "view_mask",
+    "ShenronModel", "ShenronRadarModel", "cartesian_image", "cfar", "doppler_slice", "fblr", "range_angle", "view_mask",
 ]  # fmt: skip

@@ -39,11 +39,18 @@ def range_profile(adc: ArrayLike) -> ComplexArray:
     Raises
     ------
     InputError
-        Not three dimensions.
+        Not three dimensions; two chirps, whose window is 0, 0; more than 256 samples or antennas.
     """
     data = np.asarray(adc, dtype=np.complex128)
     if data.ndim != 3:
         raise InputError(f"an ADC cube has dimensions (chirp, antenna, sample), got shape {data.shape}")
+    if data.shape[0] == 2:
+        raise InputError("the released window over two chirps is 0, 0; an image needs one chirp, or three and more")
+    if data.shape[1] > N_ANGLE or data.shape[2] > N_RANGE:
+        raise InputError(
+            f"the released transforms have {N_RANGE} points for samples and {N_ANGLE} for antennas, got a cube of "
+            f"shape {data.shape}; shenron_rt.process takes any"
+        )
     over_samples, over_chirps = np.hanning(data.shape[2]), np.hanning(data.shape[0])
     windowed = data * over_chirps[:, None, None] * over_samples
     profile: ComplexArray = np.fft.fft(windowed, N_RANGE, axis=2).transpose(2, 0, 1)
