@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -156,3 +160,15 @@ def test_brightness_of_a_car_does_not_depend_on_the_number_of_channels_in_the_me
             powers.append(np.sum(np.abs(returns.amplitude) ** 2))
         mean[channels] = np.mean(powers)
     assert abs(10 * np.log10(mean[64] / mean[512])) < 0.5
+
+
+@pytest.mark.slow
+def test_the_example_prints_its_tables_with_numbers_in_them():
+    script = Path(__file__).resolve().parents[1] / "examples" / "lidar_convergence.py"
+    command = [sys.executable, str(script), "--seeds", "1", "--densities", "1"]
+    tables = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip().split("\n\n")
+    assert len(tables) == 5
+    for table in tables:
+        cells = [row.strip("|").split("|") for row in table.splitlines()]
+        assert cells[0][1:] == [" road ", " wall ", " post ", " car ", " walker "]
+        assert all(re.fullmatch(r" [+-]\d+\.\d\d | none ", value) for row in cells[2:] for value in row[1:])
