@@ -141,6 +141,22 @@ def test_velocities_of_the_meta_layout_are_carla_axes_whatever_the_points(tmp_pa
     assert frame.sensor_pose.xyz == pytest.approx((0, 0, 2.4))
 
 
+def test_an_explicit_pose_and_a_recorded_column_are_said_to_clash(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    records = street()
+    table = np.stack([records[n].astype(np.float64) for n in records.dtype.names or ()], axis=1)
+    np.save(tmp_path / "frame.npy", np.insert(table, 3, 0.5, axis=1))
+    higher = srt.Pose((0.0, 0.0, 2.6))
+    frame = srt.read_semantic_lidar(
+        tmp_path / "frame.npy", tag_table="0.9.14", frame="carla", side_file=_meta(tmp_path), sensor_pose=higher
+    )
+    assert frame.sensor_pose == higher
+    assert "sensor_pose (0.0, 0.0, 2.6) is used" in caplog.text
+    assert "the recorded column is kept, not used" in frame.notes[-1]
+    assert frame.velocity is not None
+
+
 def test_turning_actors_move_faster_on_the_outside(tmp_path: Path) -> None:
     # 30 deg/s to the right in CARLA: -30 deg/s about z here
     side = tmp_path / "side.yaml"

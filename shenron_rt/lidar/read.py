@@ -29,6 +29,8 @@ FrameName = Literal["carla", "ros"]
 OriginName = Literal["sensor", "ego", "world"]
 #: Cosines outside [-1, 1] by no more than this come from rounding: four decimals, or float32 arithmetic.
 _ROUNDING = 1e-3
+#: Poses that differ by less are one [m, deg].
+_SAME_POSE = 0.01
 #: Slack of an actor's box [m]; mirrors and wheels stick out.
 _BOX_SLACK_M = 0.5
 
@@ -93,7 +95,7 @@ def read_semantic_lidar(
     table = _table(tag_table, at_sensor, str(path))
     tag = table.translate(at_sensor.tag)
     check_table(str(path), table, at_sensor, tag)
-    notes = [*raw.notes, *_frame_notes(raw, frame)]
+    notes = [*raw.notes, *_frame_notes(raw, frame), *_pose_notes(sensor_pose, side), *_velocity_notes(raw, side)]
     if side is not None:
         _check_boxes(at_sensor, pose, side, str(path), frame)
     for note in notes[len(raw.notes) :]:
@@ -193,6 +195,24 @@ def _frame_notes(raw: RawPoints, frame: str) -> list[str]:
     return [
         f"frame {frame!r}, but azimuths run as if y pointed {'right' if guess == 'carla' else 'left'}: is it {guess!r}?"
     ]
+
+
+def _pose_notes(given: Pose | None, side: SideFile | None) -> list[str]:
+    """Say where an explicit pose overrules the side file's."""
+    if given is None or side is None or side.sensor_pose is None:
+        return []
+    off = np.abs(np.subtract([*given.xyz, *given.ypr_deg], [*side.sensor_pose.xyz, *side.sensor_pose.ypr_deg]))
+    if off.max() < _SAME_POSE:
+        return []
+    return [
+        f"sensor_pose {given.xyz} is used, not that of {side.path}, {tuple(round(v, 4) for v in side.sensor_pose.xyz)}"
+    ]
+
+
+def _velocity_notes(raw: RawPoints, side: SideFile | None) -> list[str]:
+    if raw.range_rate is None or side is None or not side.actors:
+        return []
+    return [f"velocities are those of {side.path}; the recorded column is kept, not used"]
 
 
 def _check_boxes(raw: RawPoints, pose: Pose | None, side: SideFile, path: str, frame: str) -> None:
