@@ -148,8 +148,8 @@ def test_brightness_grows_with_the_number_of_channels_as_released(by_channels):
 
 @pytest.mark.slow
 def test_brightness_of_a_car_does_not_depend_on_the_number_of_channels_in_the_mean():
-    # Its power is that of a few mirror points within 2 degrees: 34 % of standard deviation a frame at 64 channels, 27 %
-    # at 512, which leave 0.12 and 0.2 dB here.
+    # Its power is that of a few mirror points within 2 degrees: 51 % of standard deviation a frame at 64 channels, 24 %
+    # at 512, which leave 0.18 and 0.16 dB here.
     scene = _scene(actors=({**CAR, "xyz_m": (10, 0, 0)},))
     mean = {}
     for channels, frames in ((64, 150), (512, 40)):
