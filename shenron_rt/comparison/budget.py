@@ -89,8 +89,8 @@ class Budget:
         Expected mirror-like part of rows with normals and no footprints [W].
     fluctuation_db : float
         Standard deviation that speckle gives the level of ``expected + mirror``.
-    mean_range, cosine : float
-        Weighted by backscatter, and by area.
+    mean_range, nearest, cosine : float
+        Range weighted by backscatter, of the nearest row (infinite without rows) [m]; cosine weighted by area.
     shares : dict of str to (g,) float
         Area share of each material.
     curves : dict of str to (g,) float
@@ -107,6 +107,7 @@ class Budget:
     mirror: FloatArray
     fluctuation_db: FloatArray
     mean_range: FloatArray
+    nearest: FloatArray
     cosine: FloatArray
     shares: dict[str, FloatArray]
     curves: dict[str, FloatArray]
@@ -193,11 +194,14 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     random = np.where(given, 0.0, expected + columns["mirror"])
     total_random = grouping.sum(index, random)
     share = _ratio(total_random, sums["expected"] + sums["mirror"])
+    nearest = np.full(len(grouping.keys), np.inf)
+    np.minimum.at(nearest, index, s.range)
     return Budget(
         rows=np.bincount(index, minlength=len(grouping.keys)),
         **sums,
         fluctuation_db=_fluctuation_db(total_random, grouping.sum(index, random**2)) * share,
         mean_range=_ratio(grouping.sum(index, scattered * s.range), sums["backscatter"]),
+        nearest=nearest,
         cosine=_ratio(grouping.sum(index, area * s.cos_incidence), total),
         shares=shares,
         curves=curves,

@@ -159,6 +159,7 @@ def _with_budget(record: Record, pair: _Pair, group: int) -> Record:
             record[f"rows_{side}"] = int(budget.rows[group])
             record[f"area_m2_{side}"] = float(budget.area[group])
             record[f"mean_cosine_{side}"] = float(budget.cosine[group]) if seen else None
+            record[f"nearest_m_{side}"] = float(budget.nearest[group]) if seen else None
             record[f"mean_range_m_{side}"] = float(budget.mean_range[group]) if seen else None
             shares = {k: float(v[group]) for k, v in budget.shares.items() if v[group] > 0}
             record[f"mirror_dbw_{side}"] = _level(float(budget.mirror[group] + coherent[group]))

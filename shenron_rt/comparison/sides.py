@@ -107,7 +107,7 @@ def _of_frame(frame: Any, label: str, lidar_origin: ArrayLike | None) -> Side:
 
     scatterers = getattr(frame, "scatterers", None)
     return Side(
-        name=label,
+        name=f"{label}: {getattr(frame, 'radar', 'radar')}{'' if scatterers is None else f', {scatterers.door} door'}",
         detections=frame.detections,
         profile=frame.cube.profile,
         scatterers=scatterers,

@@ -24,6 +24,7 @@ _DIVERGING = "RdBu_r"
 #: The difference picture saturates here [dB].
 _SPAN_DIFFERENCE = 20.0
 _MAX_OBJECTS = 12
+_MAX_NAME = 22
 _WIDTH = 15.0
 
 
@@ -50,7 +51,11 @@ def comparison_page(comparison: Comparison, path: Path) -> Path:
         _maps(figure, [figure.add_subplot(grid[row, k]) for k in range(3)], comparison, pair)
     _objects(figure.add_subplot(grid[rows - 1, :2]), comparison)
     _errors(figure, grid[rows - 1, 2].subgridspec(3, 1, hspace=0.75), comparison)
-    title = f"A = {comparison.name_a}    B = {comparison.name_b}    differences are B minus A"
+    names = (
+        n if n.startswith(f"{s}:") else f"{s}: {n}"
+        for s, n in zip("AB", (comparison.name_a, comparison.name_b), strict=True)
+    )
+    title = "      ".join([*names, "differences are B minus A"])
     figure.text(0.10, 1 - 0.35 / height, title, fontsize=13, weight="bold", va="center")
     notes = "; ".join(comparison.notes) or "same radar, same axes"
     figure.text(0.10, 1 - 0.65 / height, textwrap.shorten(notes, 200), fontsize=9, va="center", color="#555b66")
@@ -133,7 +138,10 @@ def _objects(ax: Axes, comparison: Comparison) -> None:
         top = 30 + max(v for v in (record["power_db_a"], record["power_db_b"]) if v is not None)
         delta = "only " + record["seen_by"].upper() if record["delta_db"] is None else f"{record['delta_db']:+.1f} dB"
         ax.text(top + 0.4, row, f"{delta}: {', '.join([record['cause'], *record['also']])}", fontsize=8, va="center")
-    ax.set_yticks(range(len(records)), [f"{r['name']} ({r['tag']})" for r in records], fontsize=8)
+    # the end of a long name tells more: vehicle.lincoln.mkz_2020
+    ax.set_yticks(
+        range(len(records)), [f"{r['name'][-_MAX_NAME:]}\n{r['tag']}, id {r['id']}" for r in records], fontsize=8
+    )
     ax.set_xlim(base, max(levels) + 0.6 * (max(levels) - base))
     ax.set_ylim(len(records) - 0.4, -0.6)
     ax.set_xlabel("received power [dBm]    blue: A, green: B", fontsize=9)
