@@ -26,8 +26,8 @@ SAMPLED_ECHOES = 160
 COLUMNS = 8192
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
-#: Oversampling of the transform's grid: the smallest, for a type-3 grid is oversampled twice.
-UPSAMPLING = 1.25
+#: Oversampling of the transform's grid: the wider grid costs less than the wider kernel a smaller one needs.
+UPSAMPLING = 2.0
 #: Loosest accuracy a transform is asked for.
 LOOSEST = 0.05
 
