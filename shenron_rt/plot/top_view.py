@@ -80,10 +80,9 @@ def top_view(
         bar.set_label(f"received power of the strongest echo in a pixel [dBm], {_SPAN_DB:.0f} dB shown", fontsize=8.5)
         bar.ax.tick_params(labelsize=8)
     figure.text(0.08, 0.955, title or "Scatterers, top view", fontsize=11, weight="bold", va="center")
-    figure.text(
-        0.86, 0.918, f"{len(scatterers):,} scatterers, {'' if mesh is None else 'mesh edges grey, '}o detections", fontsize=8, ha="right",
-        color="#555b66",
-    )  # fmt: skip
+    grey = "" if mesh is None else "mesh edges grey, "
+    legend = f"{len(scatterers):,} scatterers, {grey}o detections"
+    figure.text(0.86, 0.918, legend, fontsize=8, ha="right", color="#555b66")
     return figure
 
 
