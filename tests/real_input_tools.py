@@ -119,19 +119,34 @@ class Lock:
         return f"{head}; on it: {rows or 'nothing'}"
 
 
+def _alone(frame: srt.Frame, mine: np.ndarray) -> srt.RadarCube:
+    """Return the noise-free cube of some of the echoes."""
+    returns = frame.returns
+    rows = {f.name: getattr(returns, f.name)[mine] for f in fields(returns) if np.ndim(getattr(returns, f.name))}
+    return srt.process(srt.synthesize(replace(returns, **rows), frame.profile, noise=None, accuracy=1e-3))
+
+
 def own_snr_db(frame: srt.Frame, object_id: int) -> float:
     """Return an object's own SNR: its strongest beamformed cell, alone and noise-free, over the noise of that cell.
 
     This is what ``snr_db`` of a detection on it means. The power summed over the object lies higher where the object
     fills several cells, and says nothing of how this frame's speckle adds up.
     """
-    returns, profile = frame.returns, frame.profile
-    mine = returns.object_id == object_id
-    rows = {f.name: getattr(returns, f.name)[mine] for f in fields(returns) if np.ndim(getattr(returns, f.name))}
-    alone = srt.synthesize(replace(returns, **rows), profile, noise=None, accuracy=1e-3)
-    cube = srt.process(alone)
+    cube = _alone(frame, frame.returns.object_id == object_id)
     noise = frame.cube.noise_power_w / len(cube.azimuth_channels)
     return float(10 * np.log10(cube.range_azimuth.max() / noise))
+
+
+def rival_db(frame: srt.Frame, object_id: int) -> float:
+    """Return the strongest echo of everything else within the main lobe of an object's peak cell, over that peak [dB].
+
+    Two echoes less than a Hann main lobe apart (2 bins) and of like level are one peak, whichever processing.
+    """
+    mine = frame.returns.object_id == object_id
+    own, other = _alone(frame, mine).range_doppler, _alone(frame, ~mine).range_doppler
+    r, v = np.unravel_index(own.argmax(), own.shape)
+    near = other[max(r - 2, 0) : r + 3, np.arange(v - 2, v + 3) % own.shape[1]]
+    return float(10 * np.log10(near.max() / own[r, v]))
 
 
 def locks(frame: srt.Frame) -> dict[int, Lock]:

@@ -13,6 +13,7 @@ from real_input_tools import (
     chrono_sedan,
     frame_meta,
     locks,
+    rival_db,
     street_scene,
 )
 
@@ -33,12 +34,14 @@ GAZEBO = {
 
 
 def assert_detections_lie_on_objects(frame: srt.Frame) -> dict[int, str]:
-    """Check the objects that must be seen; return what was found of all."""
+    """Check the objects that must be seen; return what was found of all.
+
+    Excused is only what shares its cell with something at least half as strong: those two are one peak.
+    """
     found = locks(frame)
     for lock in found.values():
-        if lock.snr_db > NEEDED_SNR_DB:
-            assert len(lock.found), str(lock)
-            assert lock.object_id in lock.found["object_id"], str(lock)
+        if lock.snr_db > NEEDED_SNR_DB and lock.object_id not in lock.found["object_id"]:
+            assert rival_db(frame, lock.object_id) > -3.0, str(lock)
     return {key: str(lock) for key, lock in found.items()}
 
 
