@@ -14,8 +14,9 @@ where each term belongs to one factor: the area; the cosines at which it is seen
 lie at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
 and speckle is the rest, P / (E + M), the draw. The sum E + M splits by logarithmic means: M takes
 (M_B - M_A) / L(E_B + M_B, E_A + M_A) nepers, L(x, y) = (x - y) / ln(x / y), and each factor of E counts with weight
-L(E_B, E_A) / L(E_B + M_B, E_A + M_A), so that what changes a negligible part explains nothing. With other echo models
-than ``physical`` the last two are one term, model, and that weight is 1.
+L(E_B, E_A) / L(E_B + M_B, E_A + M_A), so that what changes a negligible part explains nothing. Where the echo models
+differ all of the difference is the term model. Where both are another one than ``physical`` the weight is 1 and the
+last two terms are one, rest: E is not their formula.
 Points of given RCS count with area = RCS and s = 1.
 
 References
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from ..config.profile import RadarProfile
     from ..returns import Returns
 
-__all__ = ["Budget", "Grouping", "Palette", "budget_of", "received", "terms_db"]
+__all__ = ["Budget", "Grouping", "Palette", "budget_of", "draw_probability", "received", "terms_db"]
 
 _POINT = "(given RCS)"
 #: Two-way pattern down to which rays are cast; rows below it do not count as seen (power).
@@ -87,6 +88,8 @@ class Budget:
         sum A; sum A s; sum A s / R^4; with the pattern of the common profile; of the own; with the weather [W].
     mirror : float
         Expected mirror-like part of rows with normals and no footprints [W].
+    looks : float
+        Independent echoes of the same power that fluctuate as ``expected + mirror`` do, (sum p)^2 / sum p^2.
     fluctuation_db : float
         Standard deviation that speckle gives the level of ``expected + mirror``.
     mean_range, nearest, cosine : float
@@ -105,6 +108,7 @@ class Budget:
     profiled: FloatArray
     expected: FloatArray
     mirror: FloatArray
+    looks: FloatArray
     fluctuation_db: FloatArray
     mean_range: FloatArray
     nearest: FloatArray
@@ -113,8 +117,8 @@ class Budget:
     curves: dict[str, FloatArray]
 
 
-def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping) -> tuple[FloatArray, FloatArray]:
-    """Return (g,) received power and (g,) power of the coherent surface echoes alone [W].
+def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping) -> tuple[FloatArray, ...]:
+    """Return (g,) received power, that of the coherent surface echoes alone, and that of the incoherent ones [W].
 
     Coherent echoes of one object add as phasors, as in :meth:`shenron_rt.Returns.power_by_object`; objects in power.
     """
@@ -132,7 +136,7 @@ def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping
         return grouping.sum(group, np.asarray(re**2 + im**2, dtype=np.float64))
 
     speckle = grouping.sum(grouping.index(returns), np.where(returns.coherent, 0.0, np.abs(returns.amplitude) ** 2))
-    return coherent_power(returns.coherent) + speckle, coherent_power(returns.coherent & ~given)
+    return coherent_power(returns.coherent) + speckle, coherent_power(returns.coherent & ~given), speckle
 
 
 @dataclass(frozen=True)
@@ -193,13 +197,15 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     sums = {name: grouping.sum(index, value) for name, value in columns.items()}
     random = np.where(given, 0.0, expected + columns["mirror"])
     total_random = grouping.sum(index, random)
+    looks = np.maximum(_ratio(total_random**2, grouping.sum(index, random**2)), 1.0)
     share = _ratio(total_random, sums["expected"] + sums["mirror"])
     nearest = np.full(len(grouping.keys), np.inf)
     np.minimum.at(nearest, index, s.range)
     return Budget(
         rows=np.bincount(index, minlength=len(grouping.keys)),
         **sums,
-        fluctuation_db=_fluctuation_db(total_random, grouping.sum(index, random**2)) * share,
+        looks=looks,
+        fluctuation_db=_fluctuation_db(looks) * share,
         mean_range=_ratio(grouping.sum(index, scattered * s.range), sums["backscatter"]),
         nearest=nearest,
         cosine=_ratio(grouping.sum(index, area * s.cos_incidence), total),
@@ -291,12 +297,8 @@ def _materials(side: Side) -> tuple[tuple[str, ...], IntArray]:
     return names, by_tag[s.tag]
 
 
-def _fluctuation_db(total: FloatArray, squares: FloatArray) -> FloatArray:
-    """Return the standard deviation of the level of a sum of exponential powers [dB].
-
-    Of n equal ones it is 10/ln 10 sqrt(psi_1(n)), 5.6 dB at n = 1; unequal ones count as (sum p)^2 / sum p^2.
-    """
-    looks = np.maximum(_ratio(total**2, squares), 1.0)
+def _fluctuation_db(looks: FloatArray) -> FloatArray:
+    """Return the standard deviation of the level of so many exponential powers, 10/ln 10 sqrt(psi_1(n)) [dB]."""
     trigamma = 1 / looks + 1 / (2 * looks**2) + 1 / (6 * looks**3)  # asymptotic series, 1.3 % high at n = 1
     return np.asarray(10 / math.log(10) * np.sqrt(trigamma), dtype=np.float64)
 
@@ -305,12 +307,26 @@ def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
 
 
+def draw_probability(budget: Budget, incoherent: FloatArray) -> FloatArray:
+    """Return (g,) how probable it is that speckle alone departs so far from its mean; 1 without incoherent echoes.
+
+    The sum of n equal exponential powers over its mean is gamma distributed, shape n, scale 1/n; twice the
+    smaller tail.
+    """
+    from scipy.special import gammainc
+
+    mean = budget.expected + budget.mirror
+    ratio = _ratio(incoherent, mean)
+    below = gammainc(budget.looks, budget.looks * ratio)
+    return np.where((mean > 0) & (incoherent > 0), 2 * np.minimum(below, 1 - below), 1.0)
+
+
 _NEPER_DB = 10 / math.log(10)
 _DIFFUSE = ("coverage", "incidence", "material", "surfaces", "range", "beam", "profile", "weather")
 
 
 def terms_db(
-    a: tuple[Budget, float, float], b: tuple[Budget, float, float], group: int, *, same_model: bool
+    a: tuple[Budget, float, float], b: tuple[Budget, float, float], group: int, *, models: tuple[str, str]
 ) -> dict[str, float] | None:
     """Return the terms of one group, B over A; they add up to the difference of its levels.
 
@@ -318,8 +334,8 @@ def terms_db(
     ----------
     a, b : (Budget, received power [W], coherent power [W])
     group : int
-    same_model : bool
-        Both sides' echoes are of the ``physical`` model, whose expected power this is.
+    models : (str, str)
+        Echo models of the sides.
 
     Returns
     -------
@@ -333,15 +349,18 @@ def terms_db(
     m_a, m_b = c_a + float(x.mirror[group]), c_b + float(y.mirror[group])
     if min(e_a + m_a, e_b + m_b, p_a, p_b) <= 0:
         return None
+    if models[0] != models[1]:
+        return {"model": _db(p_b / p_a)}
+    physical = models[0] == "physical"
     terms = dict.fromkeys(_DIFFUSE, 0.0)
     whole = _log_mean(e_b + m_b, e_a + m_a)
     if min(e_a, e_b) > 0:
-        weight = _log_mean(e_b, e_a) / whole if same_model else 1.0
+        weight = _log_mean(e_b, e_a) / whole if physical else 1.0
         terms = {name: value * weight for name, value in _diffuse_terms(x, y, values, group).items()}
-    elif same_model:  # metal has no diffuse part: on one side, or on both
+    elif physical:  # metal has no diffuse part: on one side, or on both
         terms["coverage"] = _NEPER_DB * (e_b - e_a) / whole
-    if not same_model:
-        return terms | {"model": _db(p_b / p_a) - sum(terms.values())}
+    if not physical:
+        return terms | {"rest": _db(p_b / p_a) - sum(terms.values())}
     terms["mirror"] = _NEPER_DB * (m_b - m_a) / whole
     terms["speckle"] = _db(p_b / (e_b + m_b)) - _db(p_a / (e_a + m_a))
     return terms

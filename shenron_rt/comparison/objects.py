@@ -11,7 +11,7 @@ import numpy as np
 from .._typing import FloatArray
 from ..dsp import Detections
 from ..tags import SemanticTag
-from .budget import Budget, Grouping, Palette, budget_of, received, terms_db
+from .budget import Budget, Grouping, Palette, budget_of, draw_probability, received, terms_db
 from .record import Record
 from .sides import Side
 from .sight import Sight
@@ -30,15 +30,18 @@ class _Pair:
     grouping: Grouping
     power: tuple[FloatArray, FloatArray]
     coherent: tuple[FloatArray, FloatArray]
+    probability: tuple[FloatArray, FloatArray]
     budgets: tuple[Budget, Budget] | None
-    same_model: bool
+    models: tuple[str, str]
 
     @classmethod
     def of(cls, a: Side, b: Side, by: str) -> _Pair:
         keys = [getattr(s, by) for side in (a, b) for s in (side.scatterers, side.returns) if s is not None]
         grouping = Grouping(np.unique(np.concatenate(keys).astype(np.int64)), by)
         none = np.zeros(len(grouping.keys))
-        levels = [(none, none) if s.returns is None else received(s.returns, s.scatterers, grouping) for s in (a, b)]
+        levels = [
+            (none, none, none) if s.returns is None else received(s.returns, s.scatterers, grouping) for s in (a, b)
+        ]
         budgets = None
         if all(_has_surfaces(s) for s in (a, b)) and a.profile is not None:
             palette = Palette.of(a, b)
@@ -46,8 +49,18 @@ class _Pair:
                 budget_of(a, a.profile, grouping, palette, palette.of_a),
                 budget_of(b, a.profile, grouping, palette, palette.of_b),
             )
-        same = all(s.returns is not None and s.returns.model == "physical" for s in (a, b))
-        return cls(grouping, (levels[0][0], levels[1][0]), (levels[0][1], levels[1][1]), budgets, same)
+        probable = [np.ones(len(grouping.keys))] * 2
+        if budgets is not None:
+            probable = [draw_probability(x, level[2]) for x, level in zip(budgets, levels, strict=True)]
+        models = ["" if s.returns is None else s.returns.model for s in (a, b)]
+        return cls(
+            grouping=grouping,
+            power=(levels[0][0], levels[1][0]),
+            coherent=(levels[0][1], levels[1][1]),
+            probability=(probable[0], probable[1]),
+            budgets=budgets,
+            models=(models[0], models[1]),
+        )
 
     def terms(self, group: int) -> dict[str, float] | None:
         if self.budgets is None:
@@ -56,7 +69,7 @@ class _Pair:
             (budget, float(p[group]), float(c[group]))
             for budget, p, c in zip(self.budgets, self.power, self.coherent, strict=True)
         )
-        return terms_db(a, b, group, same_model=self.same_model)
+        return terms_db(a, b, group, models=self.models)
 
     def fluctuation_db(self, group: int) -> float:
         """Return the standard deviation of the level difference by speckle; a strong coherent echo steadies a level."""
@@ -187,7 +200,7 @@ def _judge(
     if record["delta_db"] is None:
         causes = ["not_simulated"]
         if poor_side.returns is not None:
-            causes = blind_verdict(poor_side.viewer, sight, rows, pair.same_model)
+            causes = blind_verdict(poor_side.viewer, sight, rows, pair.models[0] == pair.models[1])
         record.update(cause=causes[0], also=causes[1:], meaning=CAUSES[causes[0]])
     else:
         facts: dict[str, Any] = {
@@ -196,6 +209,7 @@ def _judge(
             "viewer_poor": poor_side.viewer,
             "tags_differ": record.get("tag_a") != record.get("tag_b"),
             "many": many,
+            "probability": min(float(p[group]) for p in pair.probability),
         }
         record.update(level_verdict(record["delta_db"], record["terms_db"], pair.fluctuation_db(group), facts))
     record["sight"] = None if sight is None else Record(sight, from_side=poor)

@@ -21,6 +21,8 @@ _WORTH = 0.1
 #: Share of an object's points that must be hidden for "hidden" to be the cause.
 _HIDDEN = 0.5
 _FEW_SIGMA = 2.0
+#: A draw of the speckle rarer than this is not taken for one; three of a thousand objects are.
+_PROBABLE = 0.003
 
 #: What each cause says.
 CAUSES = {
@@ -74,7 +76,8 @@ def level_verdict(
         Standard deviation of ``delta_db`` by speckle.
     facts : mapping
         ``rows_poor``, ``sight`` (of the side with less area onto the other's points), ``viewer_poor``, ``tags_differ``,
-        ``many``: the group is many things (all that is static, a tag), of which each side may see others.
+        ``probability`` of the rarer of the two speckle draws; ``many``: the group is many things (all that is static, a
+        tag), of which each side may see others.
 
     Returns
     -------
@@ -86,12 +89,13 @@ def level_verdict(
         return _record("agrees", [], delta_db, 0.0, tolerance)
     if terms is None:
         return _record("unexplained", [], delta_db, 0.0, tolerance)
-    if facts.get("many"):
+    if facts.get("many") and "coverage" in terms:
         parts = sum(terms[k] for k in _WHICH_PART)
         terms = {"coverage": parts} | {k: v for k, v in terms.items() if k not in _WHICH_PART}
     sign = math.copysign(1.0, delta_db)
-    # a draw beyond its own spread is no explanation
-    usable = {k: v for k, v in terms.items() if k != "speckle" or abs(v) <= tolerance}
+    # a draw that speckle does not make is no explanation, and neither is the rest of a formula that is not ours
+    probable = facts.get("probability", 1.0) >= _PROBABLE
+    usable = {k: v for k, v in terms.items() if k != "rest" and (k != "speckle" or probable)}
     order = sorted((k for k in usable if sign * usable[k] > 0), key=lambda k: -sign * usable[k])
     explained = sum(v for v in usable.values() if sign * v < 0)
     chosen: list[str] = []
