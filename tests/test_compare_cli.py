@@ -38,7 +38,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     moved = [actors[1], {"id": 7, "xyz_m": [1, 2, 4]}]
     return (
         write_run(folder / "mesh", a, {"seed": 7, "actors": actors, "materials": "automotive"}),
-        write_run(folder / "lidar", b, {"seed": 9, "actors": moved, "materials": "automotive"}),
+        write_run(folder / "lidar", b, {"seed": 9, "actors": moved, "materials": "automotive", "ego": [1, 2]}),
     )
 
 
@@ -52,6 +52,7 @@ def test_two_runs_print_their_differences_and_write_page_and_json(
     data = json.loads((tmp_path / "out" / "compare.json").read_text())
     # list items are known by their id, so that another order is no change
     assert [(s["key"], s["a"], s["b"]) for s in data["settings"]] == [
+        ("ego", None, "2 entries"),
         ("seed", 7, 9),
         ("actors.7.xyz_m", [1, 2, 3], [1, 2, 4]),
     ]

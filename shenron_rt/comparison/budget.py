@@ -34,22 +34,21 @@ import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED
-from ..echo.glint import glint_sigma0
 from ..echo.link import link_amplitude
 from ..frames import spherical
 from ..scatterers import Scatterers
 from .sides import Side
+from .surfaces import COSINES, Palette, material_index, mirror_sigma0
 
 if TYPE_CHECKING:
     from ..config.profile import RadarProfile
     from ..returns import Returns
 
-__all__ = ["Budget", "Grouping", "Palette", "budget_of", "draw_probability", "received", "terms_db"]
+__all__ = ["Budget", "Grouping", "budget_of", "draw_probability", "received", "terms_db"]
 
 _POINT = "(given RCS)"
 #: Two-way pattern down to which rays are cast; rows below it do not count as seen (power).
 _EDGE = 1e-4
-_GRID = np.linspace(0.0, 1.0, 1025)
 
 
 @dataclass(frozen=True)
@@ -139,36 +138,6 @@ def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping
     return coherent_power(returns.coherent) + speckle, coherent_power(returns.coherent & ~given), speckle
 
 
-@dataclass(frozen=True)
-class Palette:
-    """The materials of both sides, so that either side's can be looked at from the other's angles.
-
-    Parameters
-    ----------
-    curves : dict of str to (k,) float
-        sigma0 over a grid of cosines.
-    of_a, of_b : dict of str to str
-        Material name -> key of ``curves``.
-    """
-
-    curves: dict[str, FloatArray]
-    of_a: dict[str, str]
-    of_b: dict[str, str]
-
-    @classmethod
-    def of(cls, a: Side, b: Side) -> Palette:
-        """Return the materials that lie on either side's rows; one name with two meanings gets two keys."""
-        curves_a = {name: _sigma0_grid(a, name) for name in _used(a)}
-        curves = dict(curves_a)
-        of_b = {}
-        for name in _used(b):
-            grid = _sigma0_grid(b, name)
-            same = name not in curves_a or np.array_equal(curves_a[name], grid)
-            of_b[name] = name if same else f"{name} (B)"
-            curves[of_b[name]] = grid
-        return cls(curves, {name: name for name in curves_a}, of_b)
-
-
 def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Palette, keys: dict[str, str]) -> Budget:
     """Return the sums of one side; ``common`` is the profile whose pattern both sides are weighed with."""
     s, own = side.scatterers, side.profile
@@ -181,7 +150,7 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     total = grouping.sum(index, area)
     sigma, shares = _surfaces(side, grouping, index, np.where(given, 0.0, area), palette, keys)
     sigma = np.where(given, 1.0, sigma)
-    means = {k: np.interp(s.cos_incidence, _GRID, curve) for k, curve in palette.curves.items()}
+    means = {k: np.interp(s.cos_incidence, COSINES, curve) for k, curve in palette.curves.items()}
     curves = {k: _ratio(grouping.sum(index, area * value), total) for k, value in means.items()}
     shares = {k: _ratio(v, total) for k, v in shares.items()}
     shares[_POINT] = _ratio(grouping.sum(index, np.where(given, area, 0.0)), total)
@@ -191,7 +160,7 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     expected = spread * _gain(own, s, weather=True)
     columns = {
         "area": area, "backscatter": scattered, "spread": spread, "expected": expected,
-        "mirror": area * _mirror(side) / np.maximum(s.range, 1e-6) ** 4 * _gain(own, s, weather=True),
+        "mirror": area * mirror_sigma0(side) / np.maximum(s.range, 1e-6) ** 4 * _gain(own, s, weather=True),
         "patterned": spread * _gain(common, s, weather=False), "profiled": spread * _gain(own, s, weather=False),
     }  # fmt: skip
     sums = {name: grouping.sum(index, value) for name, value in columns.items()}
@@ -232,69 +201,13 @@ def _surfaces(
     """Return (n,) sigma0 of every row, and the area of each material by group."""
     s = side.scatterers
     assert s is not None
-    names, number = _materials(side)
+    names, number = material_index(side)
     sigma, areas = np.zeros(len(s)), {}
     for name, key in keys.items():
         here = number == names.index(name)
-        sigma[here] = np.interp(s.cos_incidence[here], _GRID, palette.curves[key])
+        sigma[here] = np.interp(s.cos_incidence[here], COSINES, palette.curves[key])
         areas[key] = grouping.sum(index, np.where(here, area, 0.0))
     return sigma, areas
-
-
-def _mirror(side: Side) -> FloatArray:
-    """Return (n,) sigma0 of the mirror-like part of points with normals; 0 where footprints give a coherent echo."""
-    s, profile = side.scatterers, side.profile
-    assert s is not None
-    assert profile is not None
-    assert side.materials is not None
-    if s.footprint is not None or s.normal is None:
-        return np.zeros(len(s))
-    names, number = _materials(side)
-    te, tm = np.zeros(len(s), dtype=np.complex128), np.zeros(len(s), dtype=np.complex128)
-    height = np.zeros(len(s))
-    for i in np.unique(number):
-        here = number == i
-        material = side.materials[_in_weather(side, names[i])]
-        te[here], tm[here] = material.reflection(profile.center_hz, np.maximum(s.cos_incidence[here], 1e-6))
-        height[here] = 2 * math.pi / profile.wavelength_m * material.roughness_rms_m
-    direction = s.position / np.maximum(s.range, 1e-12)[:, None]
-    return glint_sigma0(te, tm, s.normal, direction, height, profile.antenna.polarization, s.slope)
-
-
-def _in_weather(side: Side, name: str) -> str:
-    assert side.materials is not None
-    weather = None if side.scatterers is None else side.scatterers.weather
-    return side.materials.in_weather(name, 0.0 if weather is None else weather.rain_mm_h)
-
-
-def _used(side: Side) -> list[str]:
-    names, number = _materials(side)
-    return [names[i] for i in np.unique(number)]
-
-
-def _sigma0_grid(side: Side, name: str) -> FloatArray:
-    """Return sigma0 of a material of a side over the grid of cosines, in the antenna's polarisation and weather."""
-    assert side.materials is not None
-    assert side.profile is not None
-    material = side.materials[_in_weather(side, name)]
-    cosine = np.maximum(_GRID, 1e-6)
-    return np.asarray(material.sigma0(side.profile.center_hz, cosine, side.profile.antenna.polarization))
-
-
-def _materials(side: Side) -> tuple[tuple[str, ...], IntArray]:
-    """Return the names of the materials and the index of every row; without materials the tag decides."""
-    from ..tags import SemanticTag
-
-    s = side.scatterers
-    assert s is not None
-    assert side.materials is not None
-    if s.material is not None:
-        return s.material_names, s.material.astype(np.int64)
-    names = tuple(side.materials.materials)
-    by_tag = np.zeros(256, dtype=np.int64)
-    for value in np.unique(s.tag):
-        by_tag[value] = names.index(side.materials.for_tag(SemanticTag(int(value)).name))
-    return names, by_tag[s.tag]
 
 
 def _fluctuation_db(looks: FloatArray) -> FloatArray:

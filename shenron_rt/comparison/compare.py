@@ -152,7 +152,7 @@ def compare(
         maps={pair.name: map_record(pair) for pair in pairs},
         scatterers=compare_clouds(left.scatterers, right.scatterers, voxel_m) if both else None,  # type: ignore[arg-type]
         detections=match_detections(left.detections, right.detections, _gate(left, right, gate_cells)),
-        settings=changed_settings(left.settings, right.settings),
+        settings=changed_settings(left, right),
         results=Record(a=results(left), b=results(right)),
         notes=notes,
         sides=(left, right),

@@ -11,10 +11,11 @@ import numpy as np
 from .._typing import FloatArray
 from ..dsp import Detections
 from ..tags import SemanticTag
-from .budget import Budget, Grouping, Palette, budget_of, draw_probability, received, terms_db
+from .budget import Budget, Grouping, budget_of, draw_probability, received, terms_db
 from .record import Record
 from .sides import Side
 from .sight import Sight
+from .surfaces import Palette
 from .verdict import CAUSES, blind_verdict, level_verdict
 
 __all__ = ["compare_objects", "compare_tags"]

@@ -13,15 +13,43 @@ from .sides import Side
 __all__ = ["changed_settings", "results"]
 
 
-def changed_settings(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[Record]:
-    """Return the keys whose values differ, dotted; list items are known by their id or name where they have one."""
-    flat_a, flat_b = _flat(a), _flat(b)
-    keys = [*flat_a, *(k for k in flat_b if k not in flat_a)]
-    return [
+def changed_settings(a: Side, b: Side) -> list[Record]:
+    """Return the keys whose values differ, dotted; list items are known by their id or name where they have one.
+
+    The profiles are compared as they were used, wherever the runs' files hold them; a block that one side has alone,
+    as a mesh scene has its actors, is one entry.
+    """
+    one, two = _settings(a), _settings(b)
+    records = [
+        Record(key=k, a=_brief(one.get(k)), b=_brief(two.get(k)))
+        for k in [*one, *(k for k in two if k not in one)]
+        if not (k in one and k in two)
+    ]
+    flat_a, flat_b = (_flat({k: v for k, v in side.items() if k in one and k in two}) for side in (one, two))
+    return records + [
         Record(key=k, a=flat_a.get(k), b=flat_b.get(k))
-        for k in keys
+        for k in [*flat_a, *(k for k in flat_b if k not in flat_a)]
         if k not in flat_a or k not in flat_b or flat_a[k] != flat_b[k]
     ]
+
+
+def _settings(side: Side) -> dict[str, Any]:
+    """Return the run's configuration with the one profile that was used in place of all that are listed."""
+    settings = {k: v for k, v in side.settings.items() if k not in ("profile", "profiles")}
+    if "radars" in settings:
+        settings["radars"] = [
+            {k: v for k, v in radar.items() if k != "profile"} if isinstance(radar, Mapping) else radar
+            for radar in settings["radars"]
+        ]
+    if side.profile is not None:
+        settings["profile"] = side.profile.model_dump(mode="json", exclude_none=True)
+    return settings
+
+
+def _brief(value: Any) -> Any:
+    if isinstance(value, Mapping | list):
+        return f"{len(value)} entries"
+    return value
 
 
 def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
