@@ -90,6 +90,14 @@ def test_nufft_reaches_1e_minus_9(only_nufft, rng):
     assert relative_error(synthesize(returns, profile, noise=None, accuracy=1e-9).data, exact) <= 1e-9
 
 
+def test_blocks_of_fewer_samples_than_terms_are_summed(only_nufft):
+    # slow chirps cut the frame into blocks of one, where the form has more monomials than samples to fit them at
+    profile = PROFILES["radarbook"]
+    returns = draw_returns(np.random.default_rng(hash_of("radarbook")), 40, profile)
+    exact = synthesize(returns, profile, noise=None, method="direct").data
+    assert relative_error(synthesize(returns, profile, noise=None, accuracy=1e-8).data, exact) <= 1e-8
+
+
 def test_nufft_holds_for_many_echoes_in_shared_groups(only_nufft, rng):
     # more echoes than are sampled for the low-rank form
     profile = make_profile(chirps=16, samples=32, array={"line": 2})

@@ -151,7 +151,7 @@ class LowRank:
         b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
         q_x, r_x = np.linalg.qr(x)
         _, r_b = np.linalg.qr(b)
-        u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T)
+        u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T, full_matrices=False)
         # row r of tails: RMS error of every echo where r terms are kept
         parts = np.abs(q_x @ u) ** 2 * s**2
         tails = np.sqrt(np.maximum(np.cumsum(parts[:, ::-1], axis=1)[:, ::-1], 0.0)).max(axis=0)
