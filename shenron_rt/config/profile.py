@@ -13,11 +13,10 @@ from pydantic import Field, model_validator
 
 from .._typing import FloatArray
 from ..constants import BOLTZMANN, SPEED_OF_LIGHT
-from ..errors import ConfigError
 from ..physics.antenna import AntennaPattern, CosinePattern, GaussianPattern, IsotropicPattern, TabulatedPattern
 from ..resources import find
 from ._base import ConfigModel, Vector3
-from .loader import parse_model
+from .loader import apply_overrides, read_yaml, validate_model
 
 __all__ = ["Antenna", "Array", "Processing", "RadarProfile", "Receiver", "Waveform", "load_profile"]
 
@@ -368,7 +367,6 @@ def load_profile(name_or_path: str | os.PathLike[str], overrides: Mapping[str, A
     0.3747
     """
     file: Path = find("profiles", name_or_path)
-    profile = parse_model(RadarProfile, file, overrides)
-    if file.stem != profile.name:
-        raise ConfigError(f"{file}: name: the file is called {file.stem!r} but says {profile.name!r}; make them equal")
-    return profile
+    data, node = read_yaml(file)
+    data = {"name": file.stem, **apply_overrides(data, overrides or {})}
+    return validate_model(RadarProfile, data, str(file), node)
