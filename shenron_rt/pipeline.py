@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .config.profile import RadarProfile
-from .config.scene import RadarMount, Scene
+from .config.scene import Scene
 from .dsp import Detections, RadarCube, detect, process
 from .errors import InputError
 from .frames import Pose
@@ -197,8 +196,4 @@ def simulate_all(source: Scene, **options: object) -> dict[str, Frame]:
         By radar name, in the scene's order.
     """
     render = functools.partial(simulate, source, **options)  # type: ignore[arg-type]
-    return {mount.name: render(radar=mount.name) for mount in _radars(source)}
-
-
-def _radars(source: Scene) -> Iterator[RadarMount]:
-    yield from source.radars
+    return {mount.name: render(radar=mount.name) for mount in source.radars}

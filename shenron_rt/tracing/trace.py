@@ -11,16 +11,17 @@ import numpy as np
 from .._parallel import map_blocks, pool
 from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
 from ..config._base import Placed
+from ..config.materials import MaterialTable
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
 from ..errors import InputError
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
-from ..scene.motion import body_state
-from ..scene.world import World, build_world, load_bodies, relative_motion
+from ..scene.motion import BodyState
+from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
-from .backend import choose_backend
+from .backend import Backend, choose_backend
 from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
 
@@ -164,7 +165,7 @@ def _cast(
 
 
 @functools.lru_cache(maxsize=4)
-def _bodies_of(scene_key: _SceneKey):  # type: ignore[no-untyped-def]
+def _bodies_of(scene_key: _SceneKey) -> tuple[tuple[Body, ...], MaterialTable]:
     return load_bodies(scene_key.scene)
 
 
@@ -184,14 +185,14 @@ class _SceneKey:
 _last: dict[str, tuple[object, World, RayCaster]] = {}
 
 
-def _prepared(scene: Scene, mount: Placed, time: float, backend: str) -> tuple[World, RayCaster]:
+def _prepared(scene: Scene, mount: Placed, time: float, backend: Backend) -> tuple[World, RayCaster]:
     """Return world and caster, kept from the last call when scene, radar pose and instant are the same."""
     key = (_SceneKey(scene), mount, time, backend)
     if "world" in _last and _last["world"][0] == key:
         return _last["world"][1:]
     bodies, materials = _bodies_of(_SceneKey(scene))
     world = build_world(scene, mount, time, bodies, materials)
-    caster = RayCaster(world.vertices, world.faces, backend)  # type: ignore[arg-type]
+    caster = RayCaster(world.vertices, world.faces, backend)
     _last["world"] = (key, world, caster)
     return world, caster
 
@@ -294,7 +295,7 @@ def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> C
     ahead = np.abs(world.face_offset[face]) if world.face_normal.size else np.full(len(d), np.inf)
     hidden = (face >= 0) & (ahead < (distance - _POINT_SLACK_M) * along)
     seen = np.flatnonzero(~hidden & (distance > 0))
-    motion = [relative_motion(body_state_of_point(w, t.velocity_mps), eye) for w, t in zip(where, targets, strict=True)]
+    motion = [relative_motion(_point_state(w, t.velocity_mps), eye) for w, t in zip(where, targets, strict=True)]
     velocity = np.array([drift + np.cross(turn, p) for (drift, turn), p in zip(motion, position, strict=True)])
     velocity = velocity.reshape(-1, 3)[seen]
     n = len(seen)
@@ -319,9 +320,6 @@ def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> C
     }
 
 
-def body_state_of_point(where: FloatArray, velocity: tuple[float, ...]):  # type: ignore[no-untyped-def]
+def _point_state(where: FloatArray, velocity: tuple[float, ...]) -> BodyState:
     """Return the state of a point that does not turn."""
-    from ..frames import Pose
-
-    x, y, z = where
-    return body_state(Pose((x, y, z)), velocity, 0.0, 0.0)
+    return BodyState(np.eye(3), where, np.asarray(velocity, dtype=np.float64), 0.0)
