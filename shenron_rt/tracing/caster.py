@@ -1,7 +1,8 @@
-"""Nearest hits of rays from the radar, by Mitsuba; everything metric is computed from the triangle in float64."""
+"""Nearest hits of rays, by Mitsuba; everything metric is computed from the triangle in float64."""
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,12 @@ _BLOCK = 1 << 20
 
 
 class RayCaster:
-    """A set of triangles that rays from the origin can be cast at.
+    """A set of triangles that rays can be cast at.
 
     Parameters
     ----------
     vertices : (v, 3) float
-        Relative to the radar, so that float32 keeps its precision near it [m].
+        Relative to the radar or the middle of a target, so that float32 keeps its precision near it [m].
     faces : (f, 3) int
     backend : str
     """
@@ -40,31 +41,41 @@ class RayCaster:
                 parameters.update()
                 self._scene = mi.load_dict({"type": "scene", "world": self._mesh})
 
-    def cast(self, directions: NDArray[np.float32]) -> IntArray:
-        """Return (n,) int32 row of the nearest face along each direction from the origin, -1 where nothing is hit.
+    def cast(self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None) -> IntArray:
+        """Return (n,) int32 row of the nearest face along each direction, -1 where nothing is hit.
 
         Parameters
         ----------
         directions : (3, n) float32
             Unit vectors, component by component.
+        origins : (3, n) float32, optional
+            Where each ray starts; default: all at the origin [m].
         """
         n = directions.shape[1]
         if self._scene is None or n == 0:
             return np.full(n, -1, dtype=np.int32)
         with use_backend(self.backend) as mi:
             run = self._one_by_one if self.backend == "scalar" else self._at_once
-            blocks = [run(mi, directions[:, i : i + _BLOCK]) for i in range(0, n, _BLOCK)]
+            blocks = []
+            for i in range(0, n, _BLOCK):
+                part = slice(i, i + _BLOCK)
+                blocks.append(run(mi, directions[:, part], None if origins is None else origins[:, part]))
         return np.concatenate(blocks)
 
-    def _at_once(self, mi: Any, d: NDArray[np.float32]) -> IntArray:
+    def _at_once(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> IntArray:
         import drjit as dr
 
-        ray = mi.Ray3f(mi.Point3f(0, 0, 0), mi.Vector3f(*(np.ascontiguousarray(c) for c in d)))
-        hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
+        def vectors(rows: NDArray[np.float32]) -> Any:
+            return (np.ascontiguousarray(c) for c in rows)
+
+        start = mi.Point3f(0, 0, 0) if o is None else mi.Point3f(*vectors(o))
+        ray = mi.Ray3f(start, mi.Vector3f(*vectors(d)))
+        hit = self._scene.ray_intersect_preliminary(ray, coherent=o is None)
         prim = dr.select(hit.is_valid(), mi.Int(hit.prim_index), mi.Int(-1))
         return np.asarray(prim.numpy(), dtype=np.int32)
 
-    def _one_by_one(self, mi: Any, d: NDArray[np.float32]) -> IntArray:
-        cast, Ray, origin = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f(0, 0, 0)
-        hits = (cast(Ray(origin, direction), True) for direction in d.T.tolist())
+    def _one_by_one(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> IntArray:
+        cast, Ray, Point = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f
+        starts = itertools.repeat(Point(0, 0, 0)) if o is None else map(Point, o.T.tolist())
+        hits = (cast(Ray(start, direction), o is None) for start, direction in zip(starts, d.T.tolist(), strict=False))
         return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int32, d.shape[1])

@@ -1,0 +1,1 @@
+"""Shooting and bouncing rays: physical optics of a target, bounce by bounce."""

@@ -1,0 +1,91 @@
+"""Cells of the lattice of rays: their corners, and how they are cut in four."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import FloatArray, IntArray
+
+__all__ = ["Cells", "Lattice"]
+
+#: Corners of a cell, in order around it (u to the right, v up).
+_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Square lattices in the planes across the views, one for each.
+
+    Parameters
+    ----------
+    low : (a, 2) float
+        Lower left corner, along H and V from the centre of the target [m].
+    step : float
+        Side of a cell of level 0 [m].
+    """
+
+    low: FloatArray
+    step: float
+
+    def points(self, view: IntArray, ij: IntArray, level: int) -> tuple[FloatArray, FloatArray]:
+        """Return (n,) coordinates of lattice points of a level [m]."""
+        size = self.step / 2**level
+        low = self.low[view]
+        return low[:, 0] + ij[:, 0] * size, low[:, 1] + ij[:, 1] * size
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Some cells of one level.
+
+    Parameters
+    ----------
+    level : int
+        Their side is the lattice's step over 2^level.
+    view : (n,) int
+    ij : (n, 2) int
+        Column and row of the lower left corner, in sides of this level.
+    done : (n,) int
+        Bounces that coarser cells have integrated already.
+    """
+
+    level: int
+    view: IntArray
+    ij: IntArray
+    done: IntArray
+
+    def __len__(self) -> int:
+        return len(self.view)
+
+    def select(self, rows: IntArray) -> Cells:
+        """Return some of the cells."""
+        return Cells(self.level, self.view[rows], self.ij[rows], self.done[rows])
+
+    def quartered(self) -> Cells:
+        """Return the four cells of the next level in each."""
+        n = len(self)
+        ij = (2 * self.ij[:, None, :] + _CORNERS).reshape(4 * n, 2)
+        return Cells(self.level + 1, np.repeat(self.view, 4), ij, np.repeat(self.done, 4))
+
+    def corners(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Return the lattice points they stand on.
+
+        Returns
+        -------
+        view : (m,) int
+        ij : (m, 2) int
+            Each point once.
+        corner : (n, 4) int
+            Points of every cell, in order around it.
+        """
+        ij = (self.ij[:, None, :] + _CORNERS).reshape(-1, 2)
+        low = ij.min(axis=0, initial=0)
+        width, height = (ij.max(axis=0, initial=0) - low + 1).tolist()
+        view = np.repeat(self.view, 4)
+        key = (view.astype(np.int64) * height + (ij[:, 1] - low[1])) * width + (ij[:, 0] - low[0])
+        points, corner = np.unique(key, return_inverse=True)
+        where, column = np.divmod(points, width)
+        number, row = np.divmod(where, height)
+        return number, np.stack([column + low[0], row + low[1]], axis=1), corner.reshape(-1, 4)

@@ -1,0 +1,137 @@
+"""Vector fields along a chain of bounces, and what the surface currents they drive radiate.
+
+Physical optics of an impedance surface: J = n x (H_i + H_r), M = -n x (E_i + E_r), of which the part seen along the
+unit vector s is J - s (s . J) + M x s. A perfect conductor has J = 2 n x H_i and no M. Fields in units of the incident
+one, wave impedance 1, time factor e^{+jwt}; the phase of the path is kept apart.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .._typing import ComplexArray, FloatArray, IntArray, NDArray
+from .chain import Bounce, Chain, dot
+from .surface import Reflector, Surface
+from .views import Views
+
+__all__ = ["Fields", "fields_along", "radiated"]
+
+
+class Fields(NamedTuple):
+    """Electric fields at the hits of one bounce, (m, 2, 3) each: transmitted V, then H."""
+
+    arriving: NDArray[np.inexact]
+    leaving: NDArray[np.inexact]
+
+
+def fields_along(surface: Surface, views: Views, chain: Chain, frequency_hz: float) -> list[Fields]:
+    """Return the fields at every bounce; real ones where every surface is a smooth perfect conductor."""
+    view, d = chain.rays.view, chain.rays.direction
+    basis = np.stack([views.vertical, views.horizontal], axis=1)[view]
+    if views.distance is not None:  # transverse to each ray, not to the axis
+        basis = basis - np.einsum("npi,ni->np", basis, d)[:, :, None] * d[:, None, :]
+        basis /= np.linalg.norm(basis, axis=2, keepdims=True)
+    field: NDArray[np.inexact] = basis if surface.conducts else basis.astype(np.complex128)
+    along = []
+    for bounce in chain.bounces:
+        arriving = field[bounce.parent]
+        leaving = _reflected(surface, bounce, arriving, frequency_hz)
+        along.append(Fields(arriving, leaving))
+        field = leaving
+    return along
+
+
+def _reflected(
+    surface: Surface, bounce: Bounce, field: NDArray[np.inexact], frequency_hz: float
+) -> NDArray[np.inexact]:
+    """Return the field of the reflected wave."""
+    n = bounce.normal[:, None, :]
+    mirrored: NDArray[np.inexact] = 2.0 * np.einsum("npi,ni->np", field, bounce.normal)[:, :, None] * n - field
+    if surface.conducts:
+        return mirrored
+    kind = surface.reflector[bounce.face]
+    for number, reflector in enumerate(surface.reflectors):
+        rows = np.flatnonzero(kind == number)
+        if len(rows) and (reflector.coefficients is not None or reflector.roughness_m > 0.0):
+            mirrored[rows] = _by_fresnel(reflector, bounce, rows, field[rows], frequency_hz)
+    return mirrored
+
+
+def _by_fresnel(
+    reflector: Reflector, bounce: Bounce, rows: IntArray, field: NDArray[np.inexact], frequency_hz: float
+) -> ComplexArray:
+    """Split the field into TE and TM, and reflect each.
+
+    With e the unit vector across the plane of incidence both waves have TM along e x d, so that their H is along e:
+    TM = +1 and TE = -1 make a conductor.
+    """
+    d, n = bounce.direction[rows], bounce.normal[rows]
+    cos = np.clip(-dot(d, n), 0.0, 1.0)
+    te, tm = _coefficients(reflector, frequency_hz, cos)
+    across = np.cross(n, d)
+    length = np.linalg.norm(across, axis=1)
+    any_tangent = np.cross(n, np.where(np.abs(n[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    across = np.where(length[:, None] > 1e-9, across, any_tangent)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    out = d + 2.0 * cos[:, None] * n
+    tm_in, tm_out = np.cross(across, d), np.cross(across, out)
+    along_te = np.einsum("npi,ni->np", field, across) * te[:, None]
+    along_tm = np.einsum("npi,ni->np", field, tm_in) * tm[:, None]
+    reflected: ComplexArray = along_te[:, :, None] * across[:, None, :] + along_tm[:, :, None] * tm_out[:, None, :]
+    return reflected
+
+
+def _coefficients(reflector: Reflector, frequency_hz: float, cos: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    from ..constants import SPEED_OF_LIGHT
+    from ..physics.roughness import coherent_factor
+
+    rough = coherent_factor(2.0 * np.pi * frequency_hz / SPEED_OF_LIGHT, reflector.roughness_m, cos)
+    if reflector.coefficients is None:
+        return -rough.astype(np.complex128), rough.astype(np.complex128)
+    te, tm = reflector.coefficients(frequency_hz, cos)
+    return te * rough, tm * rough
+
+
+def radiated(
+    arriving: NDArray[np.inexact],
+    leaving: NDArray[np.inexact],
+    direction: FloatArray,
+    normal: FloatArray,
+    area: FloatArray,
+    toward: FloatArray,
+    receive: FloatArray,
+) -> NDArray[np.inexact]:
+    """Return what the currents on flat pieces send to a receiver, without their phase.
+
+    Parameters
+    ----------
+    arriving, leaving : (n, 2, 3)
+        Fields for transmitted V and H.
+    direction, normal : (n, 3) float
+        Of arrival; the normal on the lit side.
+    area : (n, 3) float
+        Vector area of each piece on the side that is lit [m^2].
+    toward : (n, 3) float
+        Unit vector to the receiver.
+    receive : (n, 2, 3) float
+        Unit vectors V and H of the receiver, transverse to ``toward``.
+
+    Returns
+    -------
+    (n, 2, 2)
+        Receive V, H by transmit V, H: p . [S x (H_i + H_r) - (S x (E_i + E_r)) x s]; 2 S for a metal plate that faces
+        a radar [m^2].
+    """
+    out = direction - 2.0 * dot(direction, normal)[:, None] * normal
+    total = arriving + leaving
+    p_area = np.einsum("nri,ni->nr", receive, area)
+    result = -np.einsum("nri,npi->nrp", receive, total) * dot(area, toward)[:, None, None]
+    result += p_area[:, :, None] * np.einsum("npi,ni->np", total, toward)[:, None, :]
+    for field, d in ((arriving, direction), (leaving, out)):
+        # p . (S x (d x E)) = (p . d)(S . E) - (p . E)(S . d)
+        s_field = np.einsum("npi,ni->np", field, area)
+        result += np.einsum("nri,ni->nr", receive, d)[:, :, None] * s_field[:, None, :]
+        result -= np.einsum("nri,npi->nrp", receive, field) * dot(area, d)[:, None, None]
+    return result

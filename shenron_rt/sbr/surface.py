@@ -1,0 +1,130 @@
+"""What rays bounce on: a mesh with the normals, the smooth surfaces and the reflectors of its faces."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import ComplexArray, FloatArray, IntArray
+from ..scene.mesh import TaggedMesh
+from ..tracing.backend import Backend
+from ..tracing.caster import RayCaster
+
+__all__ = ["Reflector", "Surface", "smooth_groups"]
+
+#: Faces that meet at less than this belong to one smooth surface: facets of a round body do, sides of a box do not.
+SMOOTH_ANGLE = np.radians(30.0)
+#: How far above its surface a reflected ray starts, as a share of the size of the target: float32 coordinates, which
+#: the caster works in, are off by up to 6e-8 of it.
+_LIFT = 2e-6
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """How a surface reflects.
+
+    Parameters
+    ----------
+    coefficients : callable or None
+        (frequency [Hz], cosine of incidence (n,)) -> (TE, TM), each (n,) complex; None is a perfect conductor.
+    roughness_m : float
+        RMS height; weakens what is coherent [m].
+    """
+
+    coefficients: Callable[[float, FloatArray], tuple[ComplexArray, ComplexArray]] | None = None
+    roughness_m: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A target.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+        In the frame of the target; phases refer to its origin.
+    reflectors : sequence of Reflector
+    reflector : (f,) int
+        Row of ``reflectors`` for each face.
+    backend : str
+        ``"cuda"``, ``"llvm"`` or ``"scalar"``.
+    """
+
+    mesh: TaggedMesh
+    reflectors: Sequence[Reflector]
+    reflector: IntArray
+    backend: Backend
+
+    @functools.cached_property
+    def centre(self) -> FloatArray:
+        """(3,) middle of the bounding box [m]."""
+        return np.asarray(self.mesh.bounds.mean(axis=0))
+
+    @functools.cached_property
+    def radius(self) -> float:
+        """Largest distance of a vertex from the centre [m]."""
+        used = self.mesh.vertices[np.unique(self.mesh.faces)]
+        return float(np.linalg.norm(used - self.centre, axis=1).max())
+
+    @functools.cached_property
+    def normal(self) -> FloatArray:
+        """(f, 3) unit normals, either side."""
+        return self.mesh.face_normal
+
+    @functools.cached_property
+    def offset(self) -> FloatArray:
+        """(f,) normal . p on the plane of each face [m]."""
+        return np.asarray(np.einsum("ij,ij->i", self.normal, self.mesh.vertices[self.mesh.faces[:, 0]]))
+
+    @functools.cached_property
+    def group(self) -> IntArray:
+        """(f,) int64 number of the smooth surface of one reflector that each face belongs to."""
+        return smooth_groups(self.mesh, self.reflector)
+
+    @functools.cached_property
+    def caster(self) -> RayCaster:
+        """The triangles about the centre, where float32 is finest."""
+        return RayCaster(self.mesh.vertices - self.centre, self.mesh.faces, self.backend)
+
+    @property
+    def lift(self) -> float:
+        """Height above a surface at which a reflected ray starts [m]."""
+        return _LIFT * self.radius
+
+    @property
+    def conducts(self) -> bool:
+        """Whether every face is a smooth perfect conductor."""
+        return all(r.coefficients is None and r.roughness_m == 0.0 for r in self.reflectors)
+
+
+def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:
+    """Return (f,) numbers, equal for faces connected over edges at which the surface bends by less than 30 degrees.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+        Vertices at one place count as one, whether the file shares them or not.
+    reflector : (f,) int
+        Faces that reflect differently are never in one group.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    scale = max(float(np.abs(mesh.vertices).max()), 1e-9)
+    _, vertex = np.unique(np.round(mesh.vertices / scale * 1e8).astype(np.int64), axis=0, return_inverse=True)
+    corners = vertex.reshape(-1)[mesh.faces]
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    face = np.repeat(np.arange(mesh.n_faces), 3)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    ends, face = ends[order], face[order]
+    # neighbours in the sorted list share an edge; an edge of three or more faces joins them one after the other
+    shared = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
+    a, b = face[shared], face[shared + 1]
+    bend = np.abs(np.einsum("ij,ij->i", mesh.face_normal[a], mesh.face_normal[b]))
+    joined = (bend >= np.cos(SMOOTH_ANGLE)) & (reflector[a] == reflector[b])
+    ones = np.ones(int(joined.sum()), dtype=np.int8)
+    graph = coo_array((ones, (a[joined], b[joined])), shape=(mesh.n_faces, mesh.n_faces))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -1,0 +1,144 @@
+"""Tubes between four rays that hit one smooth surface: which there are, and what their footprints radiate.
+
+The path along the four corner rays is exact; between them it is taken as bilinear, so that it is continuous from tube
+to tube and exact on flat surfaces. The amplitude follows from the area of the tube: what its walls enclose is
+conserved, on curved surfaces too, where facets tilt the corner rays apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
+from .chain import Bounce, Chain, dot
+from .fields import Fields, radiated
+from .views import Views
+
+__all__ = ["footprint", "is_tube", "receive_basis", "tube_echoes"]
+
+#: How far a corner may lie from the tangent plane at another, in wavelengths.
+FLAT = 1.0 / 16.0
+#: How far the path to a corner may deviate from linear, from another corner, in wavelengths.
+STRAIGHT = 1.0 / 8.0
+#: Pairs of corners compared: the sides, both ways, and the diagonals.
+_PAIRS = ((0, 1), (1, 2), (2, 3), (3, 0), (1, 0), (2, 1), (3, 2), (0, 3), (0, 2), (1, 3))
+
+
+def is_tube(bounce: Bounce, rows: IntArray, wavelength: float, first: bool) -> BoolArray:
+    """Return which sets of four hits bound one tube.
+
+    Parameters
+    ----------
+    bounce : Bounce
+    rows : (n, 4) int
+        Rows of it.
+    wavelength : float
+        The shortest [m].
+    first : bool
+        Whether this is the first bounce, before which fronts cannot be bent.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    mark = bounce.signature[rows]
+    same: BoolArray = (mark == mark[:, :1]).all(axis=1)
+    check = np.flatnonzero(same)
+    position, normal = bounce.position[rows[check]], bounce.normal[rows[check]]
+    fits = np.ones(len(check), dtype=bool)
+    for a, b in _PAIRS:
+        fits &= np.abs(dot(normal[:, a], position[:, b] - position[:, a])) <= FLAT * wavelength
+    if not first:
+        direction, path = bounce.direction[rows[check]], bounce.path[rows[check]]
+        for a, b in _PAIRS[:4]:
+            linear = dot(direction[:, a], position[:, b] - position[:, a])
+            fits &= np.abs(path[:, b] - path[:, a] - linear) <= STRAIGHT * wavelength
+    same[check] = fits
+    return same
+
+
+def footprint(bounce: Bounce, rows: IntArray) -> FloatArray:
+    """Return (n, 3) vector areas of the quadrangles between four hits, as their order turns [m^2]."""
+    position = bounce.position
+    return 0.5 * np.cross(
+        position[rows[:, 2]] - position[rows[:, 0]], position[rows[:, 3]] - position[rows[:, 1]]
+    )
+
+
+def receive_basis(views: Views, view: IntArray, toward: FloatArray) -> FloatArray:
+    """Return (n, 2, 3) unit vectors V and H of receivers, transverse to the directions they see points under."""
+    basis = np.stack([views.vertical, views.horizontal], axis=1)[view]
+    if views.distance is None:
+        return basis
+    basis = basis - np.einsum("npi,ni->np", basis, toward)[:, :, None] * toward[:, None, :]
+    return np.asarray(basis / np.linalg.norm(basis, axis=2, keepdims=True))
+
+
+def tube_echoes(
+    lit: Views,
+    seen: Views,
+    chain: Chain,
+    order: int,
+    rows: IntArray,
+    first: IntArray,
+    fields: Fields,
+    view: IntArray,
+    free: FloatArray,
+) -> tuple[NDArray[np.inexact], FloatArray, FloatArray, FloatArray]:
+    """Return what tubes send to a receiver, but for the wavenumber.
+
+    Parameters
+    ----------
+    lit, seen : Views
+        Where the light comes from, and where it is received.
+    chain : Chain
+    order : int
+    rows, first : (n, 4) int
+        Their corners, rows of this bounce and of the first.
+    fields : Fields
+        At the hits of this bounce.
+    view : (n,) int
+        Row of ``seen``.
+    free : (n,) float
+        Share of the corners that see the receiver.
+
+    Returns
+    -------
+    strength : (n, 2, 2)
+        Receive V, H by transmit V, H [m^2].
+    path : (n,) float
+        Mean there and back, less twice the distance [m].
+    along_u, along_v : (n,) float
+        By how much it grows over the tube [m].
+    """
+    bounce = chain.bounces[order]
+    mean = 0.25 * _sum_of(bounce.position, rows)
+    direction = _sum_of(bounce.direction, rows)
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    area = footprint(bounce, rows)
+    through = dot(area, direction)
+    one = chain.bounces[0]
+    gain = free * lit.decay(0.25 * _sum_of(one.path, first))
+    if order > 0:
+        before = dot(footprint(one, first), one.direction[first[:, 0]]) * (-1.0) ** order
+        ratio = before / np.where(through == 0.0, np.inf, through)
+        # a negative ratio is a tube turned inside out by a focus, which advances the phase by a quarter turn
+        gain = gain * np.sqrt(ratio.astype(np.complex128))
+    area *= -np.sign(through)[:, None]
+    normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
+    toward, _, decay = seen.seen_from(mean, view)
+    receive = receive_basis(seen, view, toward)
+    arriving, leaving = (0.25 * _sum_of(f, rows) for f in fields)
+    strength = radiated(arriving, leaving, direction, normal, area, toward, receive)
+    strength = strength * (gain * decay)[:, None, None]
+    path = [bounce.path[rows[:, k]] + seen.seen_from(bounce.position[rows[:, k]], view)[1] for k in range(4)]
+    along_u = 0.5 * (path[1] + path[2] - path[0] - path[3])
+    along_v = 0.5 * (path[3] + path[2] - path[0] - path[1])
+    return strength, 0.25 * (path[0] + path[1] + path[2] + path[3]), along_u, along_v
+
+
+def _sum_of(values: NDArray[np.inexact], rows: IntArray) -> NDArray[np.inexact]:
+    total: NDArray[np.inexact] = values[rows[:, 0]] + values[rows[:, 1]]
+    total += values[rows[:, 2]]
+    total += values[rows[:, 3]]
+    return total
