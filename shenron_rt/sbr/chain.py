@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -68,9 +69,9 @@ class Chain:
     signature: NDArray[np.uint64]
 
 
-def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the (n,) scalar products of rows."""
-    result: FloatArray = a[:, 0] * b[:, 0]
+def dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Return the (n,) scalar products of rows, complex ones unconjugated."""
+    result: NDArray[Any] = a[:, 0] * b[:, 0]
     result += a[:, 1] * b[:, 1]
     result += a[:, 2] * b[:, 2]
     return result

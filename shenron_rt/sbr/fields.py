@@ -20,10 +20,13 @@ __all__ = ["Fields", "fields_along", "radiated"]
 
 
 class Fields(NamedTuple):
-    """Electric fields at the hits of one bounce, (m, 2, 3) each: transmitted V, then H."""
+    """Electric fields at the hits of one bounce, (m, 2, 3) each: transmitted V, then H.
+
+    What leaves a smooth perfect conductor is the mirror image of what arrives and need not be kept: None.
+    """
 
     arriving: NDArray[np.inexact]
-    leaving: NDArray[np.inexact]
+    leaving: NDArray[np.inexact] | None
 
 
 def fields_along(surface: Surface, views: Views, chain: Chain, frequency_hz: float) -> list[Fields]:
@@ -35,11 +38,13 @@ def fields_along(surface: Surface, views: Views, chain: Chain, frequency_hz: flo
         basis /= np.linalg.norm(basis, axis=2, keepdims=True)
     field: NDArray[np.inexact] = basis if surface.conducts else basis.astype(np.complex128)
     along = []
-    for bounce in chain.bounces:
+    for order, bounce in enumerate(chain.bounces):
         arriving = field[bounce.parent]
-        leaving = _reflected(surface, bounce, arriving, frequency_hz)
-        along.append(Fields(arriving, leaving))
-        field = leaving
+        if surface.conducts and order + 1 == len(chain.bounces):
+            along.append(Fields(arriving, None))
+            break
+        field = _reflected(surface, bounce, arriving, frequency_hz)
+        along.append(Fields(arriving, None if surface.conducts else field))
     return along
 
 
@@ -96,7 +101,7 @@ def _coefficients(reflector: Reflector, frequency_hz: float, cos: FloatArray) ->
 
 def radiated(
     arriving: NDArray[np.inexact],
-    leaving: NDArray[np.inexact],
+    leaving: NDArray[np.inexact] | None,
     direction: FloatArray,
     normal: FloatArray,
     area: FloatArray,
@@ -108,7 +113,7 @@ def radiated(
     Parameters
     ----------
     arriving, leaving : (n, 2, 3)
-        Fields for transmitted V and H.
+        Fields for transmitted V and H; ``leaving`` is None on a perfect conductor.
     direction, normal : (n, 3) float
         Of arrival; the normal on the lit side.
     area : (n, 3) float
@@ -116,22 +121,38 @@ def radiated(
     toward : (n, 3) float
         Unit vector to the receiver.
     receive : (n, 2, 3) float
-        Unit vectors V and H of the receiver, transverse to ``toward``.
+        Unit vectors p, V and H of the receiver, transverse to ``toward``.
 
     Returns
     -------
     (n, 2, 2)
-        Receive V, H by transmit V, H: p . [S x (H_i + H_r) - (S x (E_i + E_r)) x s]; 2 S for a metal plate that faces
-        a radar [m^2].
+        Receive V, H by transmit V, H: p . [S x (H_i + H_r) - (S x (E_i + E_r)) x s] [m^2]; 2 |S| where a metal plate
+        faces a radar.
     """
+    if leaving is None:
+        return 2.0 * _electric(arriving, direction, area, receive)
     out = direction - 2.0 * dot(direction, normal)[:, None] * normal
-    total = arriving + leaving
-    p_area = np.einsum("nri,ni->nr", receive, area)
-    result = -np.einsum("nri,npi->nrp", receive, total) * dot(area, toward)[:, None, None]
-    result += p_area[:, :, None] * np.einsum("npi,ni->np", total, toward)[:, None, :]
-    for field, d in ((arriving, direction), (leaving, out)):
-        # p . (S x (d x E)) = (p . d)(S . E) - (p . E)(S . d)
-        s_field = np.einsum("npi,ni->np", field, area)
-        result += np.einsum("nri,ni->nr", receive, d)[:, :, None] * s_field[:, None, :]
-        result -= np.einsum("nri,npi->nrp", receive, field) * dot(area, d)[:, None, None]
+    result = _electric(arriving, direction, area, receive) + _electric(leaving, out, area, receive)
+    facing = dot(area, toward)
+    for t in range(2):
+        total = arriving[:, t] + leaving[:, t]
+        ahead = dot(total, toward)
+        for r in range(2):
+            p = receive[:, r]
+            result[:, r, t] += dot(p, area) * ahead - dot(p, total) * facing
+    return result
+
+
+def _electric(
+    field: NDArray[np.inexact], direction: FloatArray, area: FloatArray, receive: FloatArray
+) -> NDArray[np.inexact]:
+    """Return p . (S x (d x E)) = (p . d)(S . E) - (p . E)(S . d), (n, 2, 2)."""
+    result = np.empty((len(field), 2, 2), dtype=field.dtype)
+    facing = dot(area, direction)
+    along = [dot(receive[:, r], direction) for r in range(2)]
+    for t in range(2):
+        e = field[:, t]
+        through = dot(area, e)
+        for r in range(2):
+            result[:, r, t] = along[r] * through - dot(receive[:, r], e) * facing
     return result

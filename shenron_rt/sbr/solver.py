@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
+from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray, NDArray
 from ..constants import SPEED_OF_LIGHT
 from ..physics.polygon import polygon_integral
 from .cells import Cells, Lattice
 from .chain import Chain, sees, trace_chain
 from .fields import Fields, fields_along
-from .rim import Pieces, pieces_of
+from .rim import Pieces, Rim
 from .surface import Surface
 from .tubes import is_tube, tube_echoes
 from .views import Views
@@ -135,16 +137,13 @@ def _level(
     chain = trace_chain(surface, lit, rays, settings.max_bounces, receivers is None)
     shortest = SPEED_OF_LIGHT / float(frequency_hz.max())
     found, pending = _sort(chain, cells, corner, shortest)
-    rest = cells.select(pending)
-    pieces = None
-    if cells.level == settings.levels and len(pending):
-        pieces = pieces_of(
-            surface, lit, chain, rest, corner[pending], lattice, receivers is None, settings.max_bounces
-        )
+    monostatic = receivers is None
+    rim = Rim(
+        surface, lit, chain, settings.max_bounces, monostatic, lattice, cells.select(pending), corner[pending]
+    )
+    pieces, left = rim.cut(shortest, cells.level == settings.levels)
     _add(surface, lit, receivers, frequency_hz, chain, corner, found, pieces, total)
-    if cells.level == settings.levels:
-        return rest.select(np.zeros(0, dtype=np.int64))
-    return rest.quartered()
+    return rim.cells.select(left).quartered()
 
 
 def _sort(chain: Chain, cells: Cells, corner: IntArray, wavelength: float) -> tuple[list[IntArray], IntArray]:
@@ -176,7 +175,7 @@ def _add(
     chain: Chain,
     corner: IntArray,
     found: list[IntArray],
-    pieces: Pieces | None,
+    pieces: Pieces,
     total: ComplexArray,
 ) -> None:
     fields: list[Fields] = []
@@ -186,21 +185,43 @@ def _add(
             fields = fields_along(surface, lit, chain, frequency)
         for order, bounce in enumerate(chain.bounces):
             for seen, view, free in _receptions(surface, lit, receivers, chain, order):
-                cell = found[order]
-                if len(cell):
-                    rows = bounce.row_of[corner[cell]]
-                    first = chain.bounces[0].row_of[corner[cell]]
-                    strength, path, along_u, along_v = tube_echoes(
-                        lit, seen, chain, order, rows, first, fields[order], view[rows[:, 0]], free[rows].mean(axis=1)
-                    )
-                    lobe = np.sinc(k * along_u / (2.0 * np.pi)) * np.sinc(k * along_v / (2.0 * np.pi))
-                    _accumulate(strength, lobe * np.exp(-1j * k * path), view[rows[:, 0]], total[number])
-                if pieces is not None:
-                    strength, path, outline, gradient, at = pieces.echoes(
-                        lit, seen, chain, order, fields[order], view, free
-                    )
-                    lobe = polygon_integral(outline, k * gradient)
-                    _accumulate(strength, lobe * np.exp(-1j * k * path), at, total[number])
+                here = lit, seen, chain, order, fields[order], view, free
+
+                def tubes(rows: slice, here: _Here = here, k: float = k, cell: IntArray = found[order]) -> ComplexArray:
+                    return _of_tubes(*here, corner[cell[rows]], k)
+
+                def rims(rows: slice, here: _Here = here, k: float = k) -> ComplexArray:
+                    return _of_pieces(*here, pieces.select(rows), k)
+
+                for part in (*map_blocks(tubes, len(found[order])), *map_blocks(rims, len(pieces))):
+                    total[number] += part
+
+
+#: Illumination, reception, rays, order of the bounce, its fields, the row of each hit in the receivers, whether it is
+#: seen from there.
+_Here: TypeAlias = tuple[Views, Views, Chain, int, Fields, IntArray, FloatArray]
+
+
+def _of_tubes(
+    lit: Views, seen: Views, chain: Chain, order: int, fields: Fields, view: IntArray, free: FloatArray,
+    corner: IntArray, k: float,
+) -> ComplexArray:  # fmt: skip
+    rows, first = chain.bounces[order].row_of[corner], chain.bounces[0].row_of[corner]
+    at = view[rows[:, 0]]
+    strength, path, along_u, along_v = tube_echoes(
+        lit, seen, chain, order, rows, first, fields, at, free[rows].mean(axis=1)
+    )
+    lobe = np.sinc(k / (2.0 * np.pi) * along_u) * np.sinc(k / (2.0 * np.pi) * along_v)
+    return _by_view(strength, lobe * np.exp(-1j * k * path), at, len(seen))
+
+
+def _of_pieces(
+    lit: Views, seen: Views, chain: Chain, order: int, fields: Fields, view: IntArray, free: FloatArray,
+    pieces: Pieces, k: float,
+) -> ComplexArray:  # fmt: skip
+    echoes = pieces.echoes(lit, seen, chain, order, fields, view, free)
+    lobe = polygon_integral(echoes.outline, k * echoes.gradient)
+    return _by_view(echoes.strength, lobe * np.exp(-1j * k * echoes.path), echoes.view, len(seen))
 
 
 def _receptions(
@@ -217,10 +238,8 @@ def _receptions(
         yield receivers, view, sees(surface, receivers, lifted, bounce.normal, view).astype(np.float64)
 
 
-def _accumulate(strength: NDArray[np.inexact], phasor: ComplexArray, view: IntArray, total: ComplexArray) -> None:
-    """Add echoes to their views, in their order."""
-    values = (strength * phasor[:, None, None]).reshape(-1, 4)
-    n = len(total)
-    for k in range(4):
-        column = np.ascontiguousarray(values[:, k])
-        total[:, k // 2, k % 2] += np.bincount(view, column.real, n) + 1j * np.bincount(view, column.imag, n)
+def _by_view(strength: NDArray[np.inexact], phasor: ComplexArray, view: IntArray, n: int) -> ComplexArray:
+    """Return (n, 2, 2) sums of echoes by view, in the order of the echoes."""
+    values = (strength.reshape(-1, 4) * phasor[:, None]).T
+    sums = [np.bincount(view, c.real, n) + 1j * np.bincount(view, c.imag, n) for c in np.ascontiguousarray(values)]
+    return np.stack(sums, axis=1).reshape(n, 2, 2)

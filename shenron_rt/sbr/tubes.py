@@ -14,14 +14,14 @@ from .chain import Bounce, Chain, dot
 from .fields import Fields, radiated
 from .views import Views
 
-__all__ = ["footprint", "is_tube", "receive_basis", "tube_echoes"]
+__all__ = ["PAIRS", "footprint", "in_line", "is_tube", "receive_basis", "tube_echoes"]
 
 #: How far a corner may lie from the tangent plane at another, in wavelengths.
-FLAT = 1.0 / 16.0
+FLAT = 1.0 / 64.0
 #: How far the path to a corner may deviate from linear, from another corner, in wavelengths.
-STRAIGHT = 1.0 / 8.0
-#: Pairs of corners compared: the sides, both ways, and the diagonals.
-_PAIRS = ((0, 1), (1, 2), (2, 3), (3, 0), (1, 0), (2, 1), (3, 2), (0, 3), (0, 2), (1, 3))
+STRAIGHT = 1.0 / 32.0
+#: Pairs of corners that are compared: the sides and the diagonals.
+PAIRS = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3))
 
 
 def is_tube(bounce: Bounce, rows: IntArray, wavelength: float, first: bool) -> BoolArray:
@@ -44,17 +44,29 @@ def is_tube(bounce: Bounce, rows: IntArray, wavelength: float, first: bool) -> B
     mark = bounce.signature[rows]
     same: BoolArray = (mark == mark[:, :1]).all(axis=1)
     check = np.flatnonzero(same)
-    position, normal = bounce.position[rows[check]], bounce.normal[rows[check]]
     fits = np.ones(len(check), dtype=bool)
-    for a, b in _PAIRS:
-        fits &= np.abs(dot(normal[:, a], position[:, b] - position[:, a])) <= FLAT * wavelength
-    if not first:
-        direction, path = bounce.direction[rows[check]], bounce.path[rows[check]]
-        for a, b in _PAIRS[:4]:
-            linear = dot(direction[:, a], position[:, b] - position[:, a])
-            fits &= np.abs(path[:, b] - path[:, a] - linear) <= STRAIGHT * wavelength
+    for a, b in PAIRS:
+        fits &= in_line(bounce, rows[check, a], rows[check, b], wavelength, first)
     same[check] = fits
     return same
+
+
+def in_line(
+    bounce: Bounce, a: IntArray, b: IntArray, wavelength: float, first: bool, other: Bounce | None = None
+) -> BoolArray:
+    """Return (n,) whether hits a and b lie so near one plane, and their fronts are so flat, that one tube holds both.
+
+    Hits b are rows of ``other`` where it is given.
+    """
+    other = other or bounce
+    step = other.position[b] - bounce.position[a]
+    fits: BoolArray = np.abs(dot(bounce.normal[a], step)) <= FLAT * wavelength
+    fits &= np.abs(dot(other.normal[b], step)) <= FLAT * wavelength
+    if not first:
+        longer = other.path[b] - bounce.path[a]
+        for here, row in ((bounce, a), (other, b)):
+            fits &= np.abs(longer - dot(here.direction[row], step)) <= STRAIGHT * wavelength
+    return fits
 
 
 def footprint(bounce: Bounce, rows: IntArray) -> FloatArray:
@@ -128,13 +140,39 @@ def tube_echoes(
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     toward, _, decay = seen.seen_from(mean, view)
     receive = receive_basis(seen, view, toward)
-    arriving, leaving = (0.25 * _sum_of(f, rows) for f in fields)
+    arriving, leaving = (f if f is None else 0.25 * _sum_of(f, rows) for f in fields)
     strength = radiated(arriving, leaving, direction, normal, area, toward, receive)
     strength = strength * (gain * decay)[:, None, None]
     path = [bounce.path[rows[:, k]] + seen.seen_from(bounce.position[rows[:, k]], view)[1] for k in range(4)]
     along_u = 0.5 * (path[1] + path[2] - path[0] - path[3])
     along_v = 0.5 * (path[3] + path[2] - path[0] - path[1])
-    return strength, 0.25 * (path[0] + path[1] + path[2] + path[3]), along_u, along_v
+    middle = 0.25 * (path[0] + path[1] + path[2] + path[3])
+    return strength, middle - _bulge(bounce, rows, toward) / 12.0, along_u, along_v
+
+
+def _bulge(bounce: Bounce, rows: IntArray, toward: FloatArray) -> FloatArray:
+    """Return (n,) second derivatives of the path over tubes, along u and v together [m].
+
+    The path between two hits a and b a step apart has the slopes g . t at its ends, g = direction - toward, t the step
+    laid onto the tangent plane along the ray. Its mean lies a twelfth of their difference below that of the ends.
+    """
+    total = np.zeros(len(rows))
+    # flat mirrors under a plane wave have none
+    tilted = np.zeros(len(rows), dtype=bool)
+    for values in (bounce.normal, bounce.direction):
+        first = values[rows[:, 0]]
+        for k in range(1, 4):
+            tilted |= (values[rows[:, k]] != first).any(axis=1)
+    bent = np.flatnonzero(tilted)
+    for p, q in ((0, 1), (3, 2), (0, 3), (1, 2)):
+        a, b = rows[bent, p], rows[bent, q]
+        step = bounce.position[b] - bounce.position[a]
+        slope = [
+            dot(d - toward[bent], step - d * (dot(n, step) / dot(n, d))[:, None])
+            for n, d in ((bounce.normal[r], bounce.direction[r]) for r in (a, b))
+        ]
+        total[bent] += 0.5 * (slope[1] - slope[0])
+    return total
 
 
 def _sum_of(values: NDArray[np.inexact], rows: IntArray) -> NDArray[np.inexact]:
