@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .pipeline import Frame as Frame
     from .pipeline import simulate as simulate
     from .pipeline import simulate_all as simulate_all
+    from .rcs import RcsSweep as RcsSweep
+    from .rcs import sweep_rcs as sweep_rcs
     from .returns import Returns as Returns
     from .returns import illuminate as illuminate
     from .scatterers import Scatterers as Scatterers
@@ -61,6 +63,7 @@ _HOME = {
     "Pose": "frames",
     "RadarCube": "dsp",
     "RadarProfile": "config.profile",
+    "RcsSweep": "rcs",
     "Returns": "returns",
     "Scatterers": "scatterers",
     "Scene": "config.scene",
@@ -80,6 +83,7 @@ _HOME = {
     "read_semantic_lidar": "lidar.read",
     "simulate": "pipeline",
     "simulate_all": "pipeline",
+    "sweep_rcs": "rcs",
     "synthesize": "synthesis",
     "trace": "tracing",
 }

@@ -22,10 +22,11 @@ LAYERS = (
     ("config",),
     ("scene", "lidar"),
     ("tracing",),
+    ("sbr",),
     ("returns", "echo"),
     ("synthesis",),
     ("dsp",),
-    ("io", "pipeline", "cshenron"),
+    ("io", "pipeline", "cshenron", "rcs"),
     ("runs",),
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page

@@ -137,9 +137,7 @@ def trace_chain(surface: Surface, views: Views, rays: Rays, max_bounces: int, mo
             free = sees(surface, views, lifted, normal, rays.view[ray])
         label = (surface.group[face].astype(np.uint64) << np.uint64(1)) + free + np.uint64(2)
         signature[ray] = (signature[ray] ^ label) * _MIX
-        bounces.append(
-            Bounce(row_of, ray, parent[hit], position, d, normal, u, v, length, face, free, signature[ray])
-        )
+        bounces.append(Bounce(row_of, ray, parent[hit], position, d, normal, u, v, length, face, free, signature[ray]))
         origin, path, parent = position, length, np.arange(len(hit), dtype=np.int32)
         if order + 1 < max_bounces:
             direction, across_u, across_v = (mirrored(a, normal) for a in (d, u, v))

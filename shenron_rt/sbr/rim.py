@@ -168,7 +168,9 @@ class Rim:
             kept = kept[self._is_straight(row[kept], sides[kept], share[kept])]
             row, sides, share = row[kept], sides[kept], share[kept]
         left = np.delete(np.arange(len(self.cells)), row)
-        return Pieces(self.corner[row].reshape(-1), np.repeat(self.cells.done[row], 4), self._outlines(sides, share)), left
+        return Pieces(
+            self.corner[row].reshape(-1), np.repeat(self.cells.done[row], 4), self._outlines(sides, share)
+        ), left
 
     def _is_flat(self, row: IntArray, wavelength: float) -> BoolArray:
         """Return whether corners that see the same surfaces see one plane of each."""

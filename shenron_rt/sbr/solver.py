@@ -138,9 +138,7 @@ def _level(
     shortest = SPEED_OF_LIGHT / float(frequency_hz.max())
     found, pending = _sort(chain, cells, corner, shortest)
     monostatic = receivers is None
-    rim = Rim(
-        surface, lit, chain, settings.max_bounces, monostatic, lattice, cells.select(pending), corner[pending]
-    )
+    rim = Rim(surface, lit, chain, settings.max_bounces, monostatic, lattice, cells.select(pending), corner[pending])
     pieces, left = rim.cut(shortest, cells.level == settings.levels)
     _add(surface, lit, receivers, frequency_hz, chain, corner, found, pieces, total)
     return rim.cells.select(left).quartered()

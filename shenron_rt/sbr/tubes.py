@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
+from .._typing import BoolArray, FloatArray, IntArray, NDArray
 from .chain import Bounce, Chain, dot
 from .fields import Fields, radiated
 from .views import Views
@@ -72,9 +72,7 @@ def in_line(
 def footprint(bounce: Bounce, rows: IntArray) -> FloatArray:
     """Return (n, 3) vector areas of the quadrangles between four hits, as their order turns [m^2]."""
     position = bounce.position
-    return 0.5 * np.cross(
-        position[rows[:, 2]] - position[rows[:, 0]], position[rows[:, 3]] - position[rows[:, 1]]
-    )
+    return 0.5 * np.cross(position[rows[:, 2]] - position[rows[:, 0]], position[rows[:, 3]] - position[rows[:, 1]])
 
 
 def receive_basis(views: Views, view: IntArray, toward: FloatArray) -> FloatArray:

@@ -103,9 +103,7 @@ class Views:
         reach = point - radar
         length = np.linalg.norm(reach, axis=1)
         d = reach / length[:, None]
-        across_u, across_v = (
-            (a - np.einsum("ij,ij->i", a, d)[:, None] * d) / length[:, None] for a in (u, v)
-        )
+        across_u, across_v = ((a - np.einsum("ij,ij->i", a, d)[:, None] * d) / length[:, None] for a in (u, v))
         start = np.maximum(np.linalg.norm(radar - centre, axis=1) - 1.01 * radius, 0.0)
         return Rays(view, x, y, radar + start[:, None] * d, d, across_u, across_v, start - self.distance)
 
