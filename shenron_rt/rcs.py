@@ -24,8 +24,11 @@ __all__ = ["RcsSweep", "sweep_rcs"]
 
 #: Least RCS reported [dBsm].
 FLOOR_DBSM = -120.0
-#: Rays per wavelength of the coarsest cells, and how often cells at edges may be quartered.
-DEFAULT_RAYS_PER_WAVELENGTH, LEVELS = 1.0, 2
+#: Rays per wavelength of the coarsest cells.
+DEFAULT_RAYS_PER_WAVELENGTH = 1.0
+#: How often cells that no tube and no clean cut fills may be quartered, by the widest target in cells of the lattice:
+#: a corner is worth it, and costs little; a car has so many that the rest of their cells average out.
+_LEVELS = ((256.0, 2), (700.0, 1), (math.inf, 0))
 MOST_BOUNCES = 10
 
 
@@ -195,7 +198,9 @@ def sweep_rcs(
 
     el, az = (a.ravel() for a in np.meshgrid(np.radians(elevation), np.radians(azimuth), indexing="ij"))
     views = Views(az, el, distance_m)
-    settings = Settings(SPEED_OF_LIGHT / float(frequency.max()) / density, LEVELS, max_bounces, seed)
+    step = SPEED_OF_LIGHT / float(frequency.max()) / density
+    levels = next(n for width, n in _LEVELS if 2.0 * surface.radius <= width * step)
+    settings = Settings(step, levels, max_bounces, seed)
     if bistatic is None:
         matrix = scattered(surface, views, frequency, settings)
     else:

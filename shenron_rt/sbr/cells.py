@@ -10,6 +10,8 @@ from .._typing import FloatArray, IntArray
 
 __all__ = ["Cells", "Lattice"]
 
+#: Largest number that is looked up in a table (of 5 bytes each) and not found by sorting.
+_TABLE = 1 << 23
 #: Corners of a cell, in order around it (u to the right, v up).
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -85,7 +87,20 @@ class Cells:
         width, height = (ij.max(axis=0, initial=0) - low + 1).tolist()
         view = np.repeat(self.view, 4)
         key = (view.astype(np.int64) * height + (ij[:, 1] - low[1])) * width + (ij[:, 0] - low[0])
-        points, corner = np.unique(key, return_inverse=True)
+        points, corner = _distinct(key)
         where, column = np.divmod(points, width)
         number, row = np.divmod(where, height)
         return number, np.stack([column + low[0], row + low[1]], axis=1), corner.reshape(-1, 4)
+
+
+def _distinct(key: IntArray) -> tuple[IntArray, IntArray]:
+    """Return sorted distinct numbers >= 0, and the row of each given one in them."""
+    if not len(key) or key.max() > _TABLE:
+        points, row = np.unique(key, return_inverse=True)
+        return points, row.reshape(-1)
+    there = np.zeros(int(key.max()) + 1, dtype=bool)
+    there[key] = True
+    points = np.flatnonzero(there)
+    row = np.zeros(len(there), dtype=np.int32)
+    row[points] = np.arange(len(points), dtype=np.int32)
+    return points, row[key]

@@ -21,8 +21,8 @@ from .views import Views
 
 __all__ = ["Echoes", "Pieces", "Rim"]
 
-#: Halvings of the side of a cell: places are known to 1/512 of it.
-HALVINGS = 8
+#: Halvings of the side of a cell to find where an edge crosses it: one that is clean, to 1/512 of the side, and others.
+HALVINGS, ROUGH_HALVINGS = 8, 5
 #: How far an edge may run from the straight line between two cuts, in sides of the cell.
 _TOLERANCE = 1.0 / 64.0
 _PLACE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -161,9 +161,12 @@ class Rim:
             row = row[self._is_flat(row, wavelength)]
         sides = crossed[row]
         share = np.full(sides.shape, 0.5)
-        clean = np.ones(sides.shape, dtype=bool)
-        share[sides], clean[sides] = self._shares(self.corner[row][sides], following[row][sides], wavelength)
+        share[sides], clean_sides = self._shares(
+            self.corner[row][sides], following[row][sides], None if all_of_them else wavelength
+        )
         if not all_of_them:
+            clean = np.ones(sides.shape, dtype=bool)
+            clean[sides] = clean_sides
             kept = np.flatnonzero(clean.all(axis=1))
             kept = kept[self._is_straight(row[kept], sides[kept], share[kept])]
             row, sides, share = row[kept], sides[kept], share[kept]
@@ -220,22 +223,25 @@ class Rim:
         ]
         return self.lattice.step / 2**self.cells.level * np.stack(outline, axis=1).reshape(-1, 4, 2)
 
-    def _shares(self, a: IntArray, b: IntArray, wavelength: float) -> tuple[FloatArray, BoolArray]:
+    def _shares(self, a: IntArray, b: IntArray, wavelength: float | None) -> tuple[FloatArray, BoolArray]:
         """Return the share of the way from rays a to b at which what a sees ends, and whether the place is clean.
 
-        It is where what b sees begins there, and a and b see one plane each as far as there.
+        It is where what b sees begins there, and a and b see one plane each as far as there; not tested without a
+        wavelength.
         """
         rays, signature = self.chain.rays, self.chain.signature
         low, high = np.minimum(a, b), np.maximum(a, b)  # a side belongs to two cells, which must agree
         pair, back = np.unique(low.astype(np.int64) * len(rays) + high, return_inverse=True)
         start, end = np.divmod(pair, len(rays))
         near, far = np.zeros(len(pair)), np.ones(len(pair))
-        for _ in range(HALVINGS):
+        for _ in range(ROUGH_HALVINGS if wavelength is None else HALVINGS):
             middle = 0.5 * (near + far)
             same = self._probe(start, end, middle).signature == signature[start]
             near, far = np.where(same, middle, near), np.where(same, far, middle)
-        clean = self._reaches(start, self._probe(start, end, near), wavelength)
-        clean &= self._reaches(end, self._probe(start, end, far), wavelength)
+        clean = np.ones(len(pair), dtype=bool)
+        if wavelength is not None:
+            clean &= self._reaches(start, self._probe(start, end, near), wavelength)
+            clean &= self._reaches(end, self._probe(start, end, far), wavelength)
         share = (0.5 * (near + far))[back.reshape(-1)]
         return np.where(a < b, share, 1.0 - share), clean[back.reshape(-1)]
 

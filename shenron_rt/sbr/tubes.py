@@ -43,7 +43,7 @@ def is_tube(bounce: Bounce, rows: IntArray, wavelength: float, first: bool) -> B
     """
     mark = bounce.signature[rows]
     same: BoolArray = (mark == mark[:, :1]).all(axis=1)
-    check = np.flatnonzero(same)
+    check = np.flatnonzero(same & ~_on_one_facet(bounce, rows) if first else same)
     fits = np.ones(len(check), dtype=bool)
     for a, b in PAIRS:
         fits &= in_line(bounce, rows[check, a], rows[check, b], wavelength, first)
@@ -72,7 +72,9 @@ def in_line(
 def footprint(bounce: Bounce, rows: IntArray) -> FloatArray:
     """Return (n, 3) vector areas of the quadrangles between four hits, as their order turns [m^2]."""
     position = bounce.position
-    return 0.5 * np.cross(position[rows[:, 2]] - position[rows[:, 0]], position[rows[:, 3]] - position[rows[:, 1]])
+    return np.asarray(
+        0.5 * np.cross(position[rows[:, 2]] - position[rows[:, 0]], position[rows[:, 3]] - position[rows[:, 1]])
+    )
 
 
 def receive_basis(views: Views, view: IntArray, toward: FloatArray) -> FloatArray:
@@ -121,31 +123,53 @@ def tube_echoes(
     along_u, along_v : (n,) float
         By how much it grows over the tube [m].
     """
-    bounce = chain.bounces[order]
-    mean = 0.25 * _sum_of(bounce.position, rows)
-    direction = _sum_of(bounce.direction, rows)
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    area = footprint(bounce, rows)
+    bounce, one = chain.bounces[order], chain.bounces[0]
+    corner = [bounce.position[rows[:, k]] for k in range(4)]
+    middle = 0.25 * (corner[0] + corner[1] + corner[2] + corner[3])
+    direction = bounce.direction[rows[:, 0]] if order == 0 else _mean_direction(bounce, rows)
+    area = 0.5 * np.cross(corner[2] - corner[0], corner[3] - corner[1])
     through = dot(area, direction)
-    one = chain.bounces[0]
-    gain = free * lit.decay(0.25 * _sum_of(one.path, first))
+    gain = free.astype(np.complex128 if order > 0 else np.float64)
+    if lit.distance is not None:
+        gain *= lit.decay(one.path[first].mean(axis=1))
     if order > 0:
         before = dot(footprint(one, first), one.direction[first[:, 0]]) * (-1.0) ** order
         ratio = before / np.where(through == 0.0, np.inf, through)
         # a negative ratio is a tube turned inside out by a focus, which advances the phase by a quarter turn
-        gain = gain * np.sqrt(ratio.astype(np.complex128))
+        gain *= np.sqrt(ratio.astype(np.complex128))
     area *= -np.sign(through)[:, None]
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
-    toward, _, decay = seen.seen_from(mean, view)
+    toward, _, decay = seen.seen_from(middle, view)
     receive = receive_basis(seen, view, toward)
-    arriving, leaving = (f if f is None else 0.25 * _sum_of(f, rows) for f in fields)
+    arriving, leaving = (f if f is None else _field(f, rows, order) for f in fields)
     strength = radiated(arriving, leaving, direction, normal, area, toward, receive)
     strength = strength * (gain * decay)[:, None, None]
-    path = [bounce.path[rows[:, k]] + seen.seen_from(bounce.position[rows[:, k]], view)[1] for k in range(4)]
+    path = [bounce.path[rows[:, k]] + seen.seen_from(corner[k], view)[1] for k in range(4)]
     along_u = 0.5 * (path[1] + path[2] - path[0] - path[3])
     along_v = 0.5 * (path[3] + path[2] - path[0] - path[1])
-    middle = 0.25 * (path[0] + path[1] + path[2] + path[3])
-    return strength, middle - _bulge(bounce, rows, toward) / 12.0, along_u, along_v
+    total = 0.25 * (path[0] + path[1] + path[2] + path[3])
+    bent = np.flatnonzero(~_on_one_facet(bounce, rows)) if order == 0 else np.arange(len(rows))
+    total[bent] -= _bulge(bounce, rows[bent], toward[bent]) / 12.0
+    return strength, total, along_u, along_v
+
+
+def _on_one_facet(bounce: Bounce, rows: IntArray) -> BoolArray:
+    face = bounce.face[rows]
+    alike: BoolArray = (face == face[:, :1]).all(axis=1)
+    return alike
+
+
+def _mean_direction(bounce: Bounce, rows: IntArray) -> FloatArray:
+    total = np.asarray(sum(bounce.direction[rows[:, k]] for k in range(4)))
+    total /= np.linalg.norm(total, axis=1)[:, None]
+    return total
+
+
+def _field(values: NDArray[np.inexact], rows: IntArray, order: int) -> NDArray[np.inexact]:
+    """Return the mean over corners; what has not bounced yet is the same at all of them."""
+    if order == 0 and not np.iscomplexobj(values):
+        return values[rows[:, 0]]
+    return np.asarray(0.25 * (values[rows[:, 0]] + values[rows[:, 1]] + values[rows[:, 2]] + values[rows[:, 3]]))
 
 
 def _bulge(bounce: Bounce, rows: IntArray, toward: FloatArray) -> FloatArray:
@@ -155,26 +179,12 @@ def _bulge(bounce: Bounce, rows: IntArray, toward: FloatArray) -> FloatArray:
     laid onto the tangent plane along the ray. Its mean lies a twelfth of their difference below that of the ends.
     """
     total = np.zeros(len(rows))
-    # flat mirrors under a plane wave have none
-    tilted = np.zeros(len(rows), dtype=bool)
-    for values in (bounce.normal, bounce.direction):
-        first = values[rows[:, 0]]
-        for k in range(1, 4):
-            tilted |= (values[rows[:, k]] != first).any(axis=1)
-    bent = np.flatnonzero(tilted)
     for p, q in ((0, 1), (3, 2), (0, 3), (1, 2)):
-        a, b = rows[bent, p], rows[bent, q]
+        a, b = rows[:, p], rows[:, q]
         step = bounce.position[b] - bounce.position[a]
         slope = [
-            dot(d - toward[bent], step - d * (dot(n, step) / dot(n, d))[:, None])
+            dot(d - toward, step - d * (dot(n, step) / dot(n, d))[:, None])
             for n, d in ((bounce.normal[r], bounce.direction[r]) for r in (a, b))
         ]
-        total[bent] += 0.5 * (slope[1] - slope[0])
-    return total
-
-
-def _sum_of(values: NDArray[np.inexact], rows: IntArray) -> NDArray[np.inexact]:
-    total: NDArray[np.inexact] = values[rows[:, 0]] + values[rows[:, 1]]
-    total += values[rows[:, 2]]
-    total += values[rows[:, 3]]
+        total += 0.5 * (slope[1] - slope[0])
     return total
