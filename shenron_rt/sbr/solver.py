@@ -74,7 +74,8 @@ def scattered(
         while len(cells):
             cells = _level(surface, lit, receivers, frequency_hz, settings, lattice, cells, total)
     wavenumber = 2.0 * np.pi * frequency_hz / SPEED_OF_LIGHT
-    return wavenumber[:, None, None, None] / (2.0 * np.sqrt(np.pi)) * total
+    total *= wavenumber[:, None, None, None] / (2.0 * np.sqrt(np.pi))
+    return total
 
 
 def _lattice(surface: Surface, lit: Views, settings: Settings) -> tuple[Lattice, Iterator[Cells]]:
@@ -181,7 +182,7 @@ def _add(
         k = 2.0 * np.pi * frequency / SPEED_OF_LIGHT
         if not fields or not surface.conducts:
             fields = fields_along(surface, lit, chain, frequency)
-        for order, bounce in enumerate(chain.bounces):
+        for order in range(len(chain.bounces)):
             for seen, view, free in _receptions(surface, lit, receivers, chain, order):
                 here = lit, seen, chain, order, fields[order], view, free
 
