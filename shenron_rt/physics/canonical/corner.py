@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import permutations
+from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,14 @@ from ...errors import InputError, did_you_mean
 from ._look import Look, look_from
 from .polygon import clip_convex, polygon_area, polygon_integral
 
-__all__ = ["TRIHEDRALS", "Corner", "dihedral_corner", "dihedral_scattering_matrix", "trihedral_corner",
-           "trihedral_scattering_matrix"]
+__all__ = [
+    "TRIHEDRALS",
+    "Corner",
+    "dihedral_corner",
+    "dihedral_scattering_matrix",
+    "trihedral_corner",
+    "trihedral_scattering_matrix",
+]
 
 #: Kinds of trihedral by the outline of their plates: right isosceles triangle, square, quarter disc.
 TRIHEDRALS = ("triangular", "square", "circular")
@@ -23,7 +29,7 @@ TRIHEDRALS = ("triangular", "square", "circular")
 #: Cosine to a plate's normal below which no wave reaches it: half a micrometre on a plate of 500 m.
 _GRAZING = 1e-9
 #: Arcs of quarter discs become chords whose sagitta is this part of a wavelength.
-_CHORD = 1.0 / 400.0
+_CHORD = 1.0 / 1600.0
 
 
 class Corner(NamedTuple):
@@ -91,7 +97,7 @@ def footprint(corner: Corner, chain: tuple[int, ...], source: FloatArray, at_inf
     ``source`` (m, 3): where the wave comes from, in the corner's frame: a point [m], or a direction ``at_infinity``.
     """
     lit = np.broadcast_to(corner.outlines[chain[0]], (len(source), *corner.outlines[chain[0]].shape))
-    for here, there in zip(chain, chain[1:], strict=False):
+    for here, there in pairwise(chain):
         source = source * np.where(np.arange(3) == here, -1.0, 1.0)  # its image behind the plate
         point = np.zeros((*lit.shape[:2], 3))
         point[..., (here + 1) % 3], point[..., (here + 2) % 3] = lit[..., 0], lit[..., 1]
@@ -114,7 +120,7 @@ def radiated(plate: int, direction: FloatArray, field: FloatArray, receive: Floa
     """Return e.(n x (d x E)), the current's part along the receiver's basis: (..., receive, transmit)."""
     along = np.einsum("...ri,...i->...r", receive, direction)
     across = np.einsum("...ri,...ti->...rt", receive, field)
-    return along[..., :, None] * field[..., None, :, plate] - across * direction[..., None, None, plate]
+    return np.asarray(along[..., :, None] * field[..., None, :, plate] - across * direction[..., None, None, plate])
 
 
 def scattering_matrix(corner: Corner, look: Look, wavelength: float, bounces: tuple[int, ...]) -> ComplexArray:
@@ -226,8 +232,12 @@ def trihedral_scattering_matrix(
         amplitude = (2 sqrt(pi)/lambda) sum over chains of e.(n x (d x E)) * integral of e^{-j k (d - u).r} dA,
 
     each integral exact (:func:`polygon_integral`). This is what a shooting-and-bouncing-rays solver converges to, not
-    the full-wave answer: that differs by 0.1 dB at boresight of a triangular corner of ten wavelengths, by 0.8 dB at five,
-    and by 1.5 to 1.9 dB for square corners of six to four. Arcs of the circular kind are chords with a sagitta of a
-    400th of a wavelength. In a wave that exactly grazes a plate, that plate does not take part.
+    the full-wave answer: that differs by 0.1 dB at boresight of a triangular corner of ten wavelengths, by 0.8 dB at
+    five, and by 1.5 to 1.9 dB for square corners of six to four. Physical optics is not reciprocal beyond one bounce:
+    HV and VH differ, by up to -41 dB of the peak for legs of 26 wavelengths. In a wave that exactly grazes a plate,
+    that plate does not take part.
+
+    Arcs of the circular kind are chords with a sagitta of a 1600th of a wavelength: finer ones change no amplitude by
+    more than 1e-5 of the largest. 1 s for 185 directions of it, 15 ms for those of the others.
     """
     return _sweep(trihedral_corner(kind, leg, wavelength), wavelength, azimuth, elevation, bounces)

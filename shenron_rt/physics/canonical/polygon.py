@@ -73,19 +73,29 @@ def polygon_integral(vertices: FloatArray, wave_vector: FloatArray) -> ComplexAr
 def _clip_half_plane(polygons: FloatArray, point: FloatArray, along: FloatArray) -> FloatArray:
     """Return convex polygons (m, n, 2) cut to what lies left of a line; rows that need fewer corners repeat one."""
     depth = along[0] * (polygons[..., 1] - point[1]) - along[1] * (polygons[..., 0] - point[0])
+    affected = np.nonzero(np.any(depth < 0.0, axis=1))[0]
+    if not len(affected):
+        return polygons
+    # one corner more than before at most; the others get a repeated last corner, an edge of no length
+    result = np.concatenate([polygons, polygons[:, -1:]], axis=1)
+    result[affected] = _cut(polygons[affected], depth[affected])
+    # drop the last column again where every row only repeats its first corner there
+    new = np.all(np.any(result[:, -1:] != result[:, [0, -2]], axis=2), axis=1)
+    return result if np.any(new) else result[:, :-1]
+
+
+def _cut(polygons: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return convex polygons (m, n, 2) as (m, n + 1, 2), cut to where ``depth`` (m, n) of their corners is positive."""
+    m, n = depth.shape
     inside, there = depth >= 0.0, np.roll(depth, -1, axis=1)
     crosses = inside != np.roll(inside, -1, axis=1)
-    if not crosses.any() and inside.all():
-        return polygons
     share = np.where(crosses, depth, 0.0) / np.where(crosses, depth - there, 1.0)
-    cut = polygons + share[..., None] * (np.roll(polygons, -1, axis=1) - polygons)
-    keep = np.stack([inside, crosses], axis=-1).reshape(len(polygons), -1)
-    corners = np.stack([polygons, cut], axis=2).reshape(len(polygons), -1, 2)
-    # Every kept corner moves to its rank in its row; ranks beyond the last repeat the first, an edge of no length.
-    count = keep.sum(axis=1)
-    width = max(1, int(count.max(initial=0)))
-    first = corners[np.arange(len(corners)), np.argmax(keep, axis=1)]
-    result = np.repeat(np.where(count[:, None] > 0, first, 0.0)[:, None, :], width, axis=1)
+    crossing = polygons + share[..., None] * (np.roll(polygons, -1, axis=1) - polygons)
+    keep = np.stack([inside, crosses], axis=-1).reshape(m, 2 * n)
+    corners = np.stack([polygons, crossing], axis=2).reshape(m, 2 * n, 2)
+    # Every kept corner moves to its rank in its row; ranks beyond the last repeat the first.
+    first = corners[np.arange(m), np.argmax(keep, axis=1)]
+    result = np.repeat(np.where(keep.any(axis=1)[:, None], first, 0.0)[:, None, :], n + 1, axis=1)
     row, column = np.nonzero(keep)
     result[row, (np.cumsum(keep, axis=1) - 1)[row, column]] = corners[row, column]
     return result
@@ -108,7 +118,7 @@ def clip_convex(polygons: FloatArray, window: FloatArray) -> FloatArray:
 
     References
     ----------
-    .. [1] I. E. Sutherland, G. W. Hodgman, "Reentrant polygon clipping", Commun. ACM 17(1), 32-42 (1974).
+    .. [1] I. E. Sutherland, G. W. Hodgman, "Reentrant polygon clipping", Communications of the ACM 17(1), 32-42 (1974).
     """
     for point, following in zip(window, np.roll(window, -1, axis=0), strict=True):
         polygons = _clip_half_plane(polygons, point, following - point)
