@@ -95,7 +95,7 @@ def _cut(polygons: FloatArray, depth: FloatArray) -> FloatArray:
     corners = np.stack([polygons, crossing], axis=2).reshape(m, 2 * n, 2)
     # Every kept corner moves to its rank in its row; ranks beyond the last repeat the first.
     first = corners[np.arange(m), np.argmax(keep, axis=1)]
-    result = np.repeat(np.where(keep.any(axis=1)[:, None], first, 0.0)[:, None, :], n + 1, axis=1)
+    result = np.repeat(np.where(np.any(keep, axis=1, keepdims=True), first, 0.0)[:, None, :], n + 1, axis=1)
     row, column = np.nonzero(keep)
     result[row, (np.cumsum(keep, axis=1) - 1)[row, column]] = corners[row, column]
     return result
