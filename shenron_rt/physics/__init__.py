@@ -20,8 +20,13 @@ from .canonical import (
     disc_scattering_matrix,
     ellipsoid_rcs,
     infinite_plate_rcs,
+    near_range_cylinder_rcs,
+    near_range_dihedral_matrix,
     near_range_disc_rcs,
     near_range_plate_rcs,
+    near_range_surface_amplitude,
+    near_range_trihedral_matrix,
+    near_range_trihedral_rcs,
     plate_amplitude,
     plate_rcs,
     plate_scattering_matrix,
@@ -41,7 +46,7 @@ from .link_budget import noise_power, rcs_from_power, received_power, snr
 from .noise import noise_power_per_sample
 from .permittivity import cole_cole_permittivity, conductor_permittivity, p2040_permittivity, water_permittivity
 from .roughness import coherent_factor, rayleigh_height
-from .two_ray import two_ray_factor
+from .two_ray import four_path_factor, two_ray_factor
 
 __all__ = [
     "AntennaPattern",
@@ -68,6 +73,7 @@ __all__ = [
     "disc_scattering_matrix",
     "ellipsoid_rcs",
     "fog_attenuation",
+    "four_path_factor",
     "fresnel",
     "fresnel_cos",
     "gas_attenuation",
@@ -78,8 +84,13 @@ __all__ = [
     "layered",
     "limit_sigma0",
     "liquid_water_content",
+    "near_range_cylinder_rcs",
+    "near_range_dihedral_matrix",
     "near_range_disc_rcs",
     "near_range_plate_rcs",
+    "near_range_surface_amplitude",
+    "near_range_trihedral_matrix",
+    "near_range_trihedral_rcs",
     "noise_power",
     "noise_power_per_sample",
     "p2040_permittivity",

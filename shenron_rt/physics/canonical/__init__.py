@@ -22,9 +22,11 @@ from .convex import (
     plate_scattering_matrix,
 )
 from .corner import dihedral_scattering_matrix, trihedral_scattering_matrix
+from .near_corner import near_range_dihedral_matrix, near_range_trihedral_matrix, near_range_trihedral_rcs
 from .near_range import infinite_plate_rcs, near_range_disc_rcs, near_range_plate_rcs
 from .polygon import polygon_integral
 from .sphere import sphere_mie_amplitude, sphere_mie_rcs, sphere_po_amplitude, sphere_scattering_matrix
+from .surface_integral import near_range_cylinder_rcs, near_range_surface_amplitude
 
 __all__ = [
     "box_amplitude",
@@ -38,8 +40,13 @@ __all__ = [
     "disc_scattering_matrix",
     "ellipsoid_rcs",
     "infinite_plate_rcs",
+    "near_range_cylinder_rcs",
+    "near_range_dihedral_matrix",
     "near_range_disc_rcs",
     "near_range_plate_rcs",
+    "near_range_surface_amplitude",
+    "near_range_trihedral_matrix",
+    "near_range_trihedral_rcs",
     "plate_amplitude",
     "plate_rcs",
     "plate_scattering_matrix",
