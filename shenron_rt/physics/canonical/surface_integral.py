@@ -72,7 +72,7 @@ def near_range_surface_amplitude(
     -----
     Single bounce; a surface that hides parts of itself needs limits that leave them out. Twelve Gauss-Legendre nodes
     for two cycles of the two-way phase at its fastest: below 1e-9 where the patch is smooth and faces the radar all
-    over. Where the lit part ends inside the patch the kink there costs up to 1e-4 of the peak: end the patch there.
+    over. Where the lit part ends inside the patch the kink costs some 1e-3 (a sphere of k a = 48): end the patch there.
     """
     at = np.asarray(radar, dtype=np.float64)
     reference = float(np.linalg.norm(at))
