@@ -14,11 +14,10 @@ from shenron_rt.errors import InputError
 from shenron_rt.physics import (
     dihedral_rcs,
     dihedral_scattering_matrix,
-    polygon_integral,
     trihedral_rcs,
     trihedral_scattering_matrix,
 )
-from shenron_rt.physics.canonical.polygon import clip_convex, polygon_area
+from shenron_rt.physics.canonical.polygon import clip_convex, polygon_area, polygon_transform
 
 WAVELENGTH = wavelength(77)
 ENTRY = {"VV": (0, 0), "HH": (1, 1), "HV": (1, 0)}
@@ -184,7 +183,7 @@ def test_impossible_corners_are_refused() -> None:
         dihedral_scattering_matrix(0.1, 0.1, math.nan, WAVELENGTH, 0.0)
 
 
-def test_polygon_integral_is_exact_from_no_phase_to_many_cycles() -> None:
+def test_polygon_transform_is_exact_from_no_phase_to_many_cycles() -> None:
     # a triangle, against nested Gauss-Legendre: 40 nodes resolve 8 cycles to rounding
     corners = np.array([[0.3, -0.2], [1.1, 0.1], [0.2, 0.9]])
     x, weight = np.polynomial.legendre.leggauss(40)
@@ -196,8 +195,8 @@ def test_polygon_integral_is_exact_from_no_phase_to_many_cycles() -> None:
         for angle in (0.0, 0.4, 2.0):
             q = size * np.array([math.cos(angle), math.sin(angle)])
             want = np.sum(weights * np.exp(1j * points @ q))
-            assert polygon_integral(corners, q) == pytest.approx(want, rel=1e-11)
-            assert polygon_integral(corners[::-1], q) == pytest.approx(-want, rel=1e-11)
+            assert polygon_transform(corners, q) == pytest.approx(want, rel=1e-11)
+            assert polygon_transform(corners[::-1], q) == pytest.approx(-want, rel=1e-11)
 
 
 def test_clipping_keeps_what_two_polygons_share(rng: np.random.Generator) -> None:

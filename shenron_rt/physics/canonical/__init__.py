@@ -24,7 +24,7 @@ from .convex import (
 from .corner import dihedral_scattering_matrix, trihedral_scattering_matrix
 from .near_corner import near_range_dihedral_matrix, near_range_trihedral_matrix, near_range_trihedral_rcs
 from .near_range import infinite_plate_rcs, near_range_disc_rcs, near_range_plate_rcs
-from .polygon import polygon_integral
+from .polygon import polygon_transform
 from .sphere import sphere_mie_amplitude, sphere_mie_rcs, sphere_po_amplitude, sphere_scattering_matrix
 from .surface_integral import near_range_cylinder_rcs, near_range_surface_amplitude
 
@@ -50,7 +50,7 @@ __all__ = [
     "plate_amplitude",
     "plate_rcs",
     "plate_scattering_matrix",
-    "polygon_integral",
+    "polygon_transform",
     "sphere_mie_amplitude",
     "sphere_mie_rcs",
     "sphere_po_amplitude",

@@ -12,7 +12,7 @@ import numpy as np
 from ..._typing import ArrayLike, ComplexArray, FloatArray
 from ...errors import InputError, did_you_mean
 from ._look import Look, look_from
-from .polygon import clip_convex, polygon_area, polygon_integral
+from .polygon import clip_convex, polygon_area, polygon_transform
 
 __all__ = [
     "TRIHEDRALS",
@@ -136,7 +136,7 @@ def scattering_matrix(corner: Corner, look: Look, wavelength: float, bounces: tu
         lit = footprint(corner, chain, towards, at_infinity=True)
         direction, field = incident(chain, -towards, receive)
         w = k * (towards - direction)[:, [(last + 1) % 3, (last + 2) % 3]]
-        integral = np.sign(polygon_area(lit)) * polygon_integral(lit, w)
+        integral = np.sign(polygon_area(lit)) * polygon_transform(lit, w)
         total[reached] += radiated(last, direction, field, receive) * integral[:, None, None]
     total[np.any(u[:, :plates] < -_GRAZING, axis=1)] = np.nan
     return 2.0 * math.sqrt(math.pi) / wavelength * total
@@ -231,7 +231,7 @@ def trihedral_scattering_matrix(
 
         amplitude = (2 sqrt(pi)/lambda) sum over chains of e.(n x (d x E)) * integral of e^{-j k (d - u).r} dA,
 
-    each integral exact (:func:`polygon_integral`). This is what a shooting-and-bouncing-rays solver converges to, not
+    each integral exact (:func:`polygon_transform`). This is what a shooting-and-bouncing-rays solver converges to, not
     the full-wave answer: that differs by 0.1 dB at boresight of a triangular corner of ten wavelengths, by 0.8 dB at
     five, and by 1.5 to 1.9 dB for square corners of six to four. Physical optics is not reciprocal beyond one bounce:
     HV and VH differ, by up to -41 dB of the peak for legs of 26 wavelengths. In a wave that exactly grazes a plate,

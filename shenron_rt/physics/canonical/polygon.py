@@ -1,4 +1,7 @@
-"""Flat polygons: the exact integral of a linear phase over one, and convex clipping, for many polygons at once."""
+"""Flat polygons: the exact integral of a linear phase over one, and convex clipping, for many polygons at once.
+
+Written apart from what the solvers use, so that the references do not share their mistakes.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import numpy as np
 
 from ..._typing import ComplexArray, FloatArray
 
-__all__ = ["clip_convex", "polygon_area", "polygon_integral"]
+__all__ = ["clip_convex", "polygon_area", "polygon_transform"]
 
 #: Largest phase [rad] across a polygon below which its integral is its area: the error is this number.
 _NO_PHASE = 1e-9
@@ -28,7 +31,7 @@ def _sinc_minus_one(y: FloatArray) -> FloatArray:
     return np.where(np.abs(y) < 0.05, series, np.sinc(y / np.pi) - 1.0)
 
 
-def polygon_integral(vertices: FloatArray, wave_vector: FloatArray) -> ComplexArray:
+def polygon_transform(vertices: FloatArray, wave_vector: FloatArray) -> ComplexArray:
     """Return the integral of exp(j w.r) over flat polygons, exactly.
 
     Parameters
