@@ -15,6 +15,7 @@ from shenron_rt.constants import BOLTZMANN, SPEED_OF_LIGHT
 from shenron_rt.errors import InputError
 from shenron_rt.physics import (
     fog_attenuation,
+    four_path_factor,
     gas_attenuation,
     liquid_water_content,
     noise_power,
@@ -160,6 +161,31 @@ def test_two_ray_over_a_metal_plane_doubles_or_cancels_the_field() -> None:
     lobe = path * f / SPEED_OF_LIGHT  # cycles; TE of a metal is -1: maxima at half cycles, nulls at whole ones
     assert np.all(factor[np.abs(lobe % 1 - 0.5) < 0.01] > 1.9)
     assert np.all(factor[np.minimum(lobe % 1, 1 - lobe % 1) < 0.01] < 0.1)
+
+
+def test_the_four_paths_of_an_isotropic_target_are_the_square_of_the_one_way_factor() -> None:
+    geometry = (5.2 - 0.21j, 0.6, 1.0, np.linspace(4.0, 120.0, 500), 77e9)
+    for letter in ("V", "H"):
+        for rough in (0.0, 3e-4):
+            one_way = two_ray_factor(*geometry, letter, roughness_rms_m=rough)
+            assert np.allclose(four_path_factor(*geometry, letter, roughness_rms_m=rough), one_way**2, rtol=1e-12)
+
+
+def test_each_of_the_four_paths_is_its_own() -> None:
+    geometry = (5.2 - 0.21j, 0.6, 1.0, 30.0, 24.125e9, "H")
+    image = two_ray_factor(*geometry) - 1.0
+    assert four_path_factor(*geometry, mixed=0.0, reflected=0.0) == pytest.approx(1.0, rel=1e-15)
+    assert four_path_factor(*geometry, mixed=0.5j, reflected=0.0) == pytest.approx(1.0 + 1j * image, rel=1e-12)
+    assert four_path_factor(*geometry, mixed=0.0, reflected=0.3) == pytest.approx(1.0 + 0.3 * image**2, rel=1e-12)
+
+
+def test_a_rough_road_fades_the_lobes_by_its_rayleigh_factor() -> None:
+    heights, ground, rough = (0.6, 1.0), 12.0, 2e-3
+    smooth = two_ray_factor(5.2, *heights, ground, 77e9) - 1.0
+    faded = two_ray_factor(5.2, *heights, ground, 77e9, roughness_rms_m=rough) - 1.0
+    grazing_sine = 1.6 / math.hypot(12.0, 1.6)
+    want = math.exp(-2.0 * (2.0 * math.pi * 77e9 / SPEED_OF_LIGHT * rough * grazing_sine) ** 2)
+    assert complex(faded / smooth) == pytest.approx(want, rel=1e-12)
 
 
 def test_bad_input_says_what_is_allowed() -> None:
