@@ -221,7 +221,8 @@ class Rim:
             )
             for k in range(4)
         ]
-        return self.lattice.step / 2**self.cells.level * np.stack(outline, axis=1).reshape(-1, 4, 2)
+        side = self.lattice.step / 2**self.cells.level
+        return np.asarray(side * np.stack(outline, axis=1).reshape(-1, 4, 2))
 
     def _shares(self, a: IntArray, b: IntArray, wavelength: float | None) -> tuple[FloatArray, BoolArray]:
         """Return the share of the way from rays a to b at which what a sees ends, and whether the place is clean.

@@ -11,10 +11,10 @@ import numpy as np
 from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray, NDArray
 from ..constants import SPEED_OF_LIGHT
-from ..physics.polygon import polygon_integral
 from .cells import Cells, Lattice
 from .chain import Chain, sees, trace_chain
 from .fields import Fields, fields_along
+from .polygon import polygon_integral
 from .rim import Pieces, Rim
 from .surface import Surface
 from .tubes import is_tube, tube_echoes

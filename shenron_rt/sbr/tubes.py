@@ -141,7 +141,8 @@ def tube_echoes(
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     toward, _, decay = seen.seen_from(middle, view)
     receive = receive_basis(seen, view, toward)
-    arriving, leaving = (f if f is None else _field(f, rows, order) for f in fields)
+    arriving = _field(fields.arriving, rows, order)
+    leaving = None if fields.leaving is None else _field(fields.leaving, rows, order)
     strength = radiated(arriving, leaving, direction, normal, area, toward, receive)
     strength = strength * (gain * decay)[:, None, None]
     path = [bounce.path[rows[:, k]] + seen.seen_from(corner[k], view)[1] for k in range(4)]

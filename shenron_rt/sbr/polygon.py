@@ -1,14 +1,16 @@
-"""The Fourier integral of a flat polygon."""
+"""The Fourier integral of a flat polygon, over many small ones at once.
+
+The closed forms the solver is held against have one of their own, :func:`shenron_rt.physics.canonical.polygon_transform`,
+so that a mistake here cannot hide.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .._typing import ComplexArray, FloatArray
 
 __all__ = ["polygon_integral"]
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: Phase over a polygon below which its second-order expansion is exact to 1e-6 of the area, and above which the
 #: contour form, whose rounding grows with the inverse of the phase, is as exact [rad].
