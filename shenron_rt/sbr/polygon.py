@@ -1,7 +1,7 @@
 """The Fourier integral of a flat polygon, over many small ones at once.
 
-The closed forms the solver is held against have one of their own, :func:`shenron_rt.physics.canonical.polygon_transform`,
-so that a mistake here cannot hide.
+The closed forms the solver is held against have one of their own,
+:func:`shenron_rt.physics.canonical.polygon_transform`, so that a mistake here cannot hide.
 """
 
 from __future__ import annotations
