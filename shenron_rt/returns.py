@@ -42,13 +42,16 @@ class Returns:
     bounces : (n,) uint8
         Surfaces met on the way.
     scatterer : (n,) int64
-        Row of the :class:`~shenron_rt.scatterers.Scatterers` it came from.
+        Row of the :class:`~shenron_rt.scatterers.Scatterers` it came from; -1 - row of their ``paths`` where it came
+        over several surfaces.
     center_hz : float
         f_c of the profile, for the phase sum of :meth:`power_by_object` [Hz].
     model : str
         The echo model.
     weather : Weather or None
         Whose attenuation the amplitudes have; ``None`` is none.
+    departure : (n, 3) float or None
+        Like ``position``, at the same distance, in the direction in which the wave left; ``None``: the same.
     """
 
     amplitude: ComplexArray
@@ -62,13 +65,14 @@ class Returns:
     center_hz: float
     model: str = "physical"
     weather: Weather | None = None
+    departure: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.amplitude)
         for name in ("object_id", "tag", "coherent", "bounces", "scatterer"):
             if np.shape(getattr(self, name)) != (n,):
                 raise InputError(f"Returns.{name}: shape ({n},) is needed, got {np.shape(getattr(self, name))}")
-        for name in ("position", "velocity"):
+        for name in ("position", "velocity", *(() if self.departure is None else ("departure",))):
             if np.shape(getattr(self, name)) != (n, 3):
                 raise InputError(f"Returns.{name}: shape ({n}, 3) is needed, got {np.shape(getattr(self, name))}")
 
@@ -113,12 +117,14 @@ class Returns:
         ------
         NotFoundError, InputError
         """
-        names = [f.name for f in fields(cls) if f.name != "weather"]
+        names = [f.name for f in fields(cls) if f.name not in ("weather", "departure")]
         arrays: dict[str, Any] = load_npz(path, names)
         values = {name: arrays[name] for name in names}
         values |= {"center_hz": float(values["center_hz"]), "model": str(values["model"])}
         if "weather" in arrays:
             values["weather"] = Weather.from_array(arrays["weather"])
+        if "departure" in arrays:
+            values["departure"] = arrays["departure"]
         return cls(**values)
 
 

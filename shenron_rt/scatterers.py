@@ -11,6 +11,7 @@ import numpy as np
 from ._typing import ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from .errors import InputError
 from .io.npz import load_npz, save_npz
+from .paths import Paths
 
 __all__ = ["TABLE_COLUMNS", "Scatterers", "Weather"]
 
@@ -106,6 +107,8 @@ class Scatterers:
         Given RCS of a point target [m^2]; NaN for surfaces.
     bounces : (n,) uint8 or None
         Surfaces met on the way; ``None`` means 1 everywhere.
+    paths : Paths or None
+        Ways over several surfaces, beside the rows.
     weather : Weather or None
         Weather of the scene.
     radar : str
@@ -143,6 +146,7 @@ class Scatterers:
     jitter: FloatArray | None = None
     rcs: FloatArray | None = None
     bounces: IntArray | None = None
+    paths: Paths | None = None
     weather: Weather | None = None
     radar: str = ""
     seed: int = 0
@@ -234,7 +238,10 @@ class Scatterers:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save every field to an ``.npz`` file."""
-        arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "weather"}
+        plain = [f.name for f in fields(self) if f.name not in ("weather", "paths")]
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in plain}
+        if self.paths is not None:
+            arrays |= {f"path_{f.name}": getattr(self.paths, f.name) for f in fields(self.paths)}
         arrays["material_names"] = np.asarray(self.material_names, dtype=str)
         if self.weather is not None:
             arrays["weather"] = self.weather.to_array()
@@ -254,6 +261,8 @@ class Scatterers:
         values["material_names"] = tuple(str(v) for v in arrays.get("material_names", ()))
         if "weather" in values:
             values["weather"] = Weather.from_array(values["weather"])
+        if "path_count" in arrays:
+            values["paths"] = Paths(**{f.name: arrays[f"path_{f.name}"] for f in fields(Paths)})
         if "origin" in values:
             values["origin"] = tuple(float(v) for v in values["origin"])
         for name, kind in (("radar", str), ("backend", str), ("door", str), ("seed", int), ("frame", int)):

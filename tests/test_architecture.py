@@ -18,11 +18,12 @@ LAYERS = (
     ("errors", "constants", "_typing"),
     ("frames", "randomness", "resources", "_parallel", "io.npz", "config._base", "config.loader"),
     ("physics", "tags"),
-    ("scatterers", "scene.mesh", "scene.mesh_frames"),  # plain values that the scene's models hold
+    ("paths", "scatterers", "scene.mesh", "scene.mesh_frames"),  # plain values that the scene's models hold
     ("config",),
     ("scene", "lidar"),
-    ("tracing",),
+    ("tracing.backend", "tracing.caster"),
     ("sbr",),
+    ("tracing",),
     ("returns", "echo"),
     ("synthesis",),
     ("dsp",),

@@ -16,16 +16,20 @@ if TYPE_CHECKING:
 __all__ = ["link_amplitude"]
 
 
-def link_amplitude(profile: RadarProfile, position: FloatArray, weather: Weather | None) -> FloatArray:
+def link_amplitude(
+    profile: RadarProfile, position: FloatArray, weather: Weather | None, *, departure: FloatArray | None = None
+) -> FloatArray:
     """Return sqrt(Pt Gt Gr / L): all of the radar equation but lambda^2 sigma / ((4 pi)^3 R^4).
 
     Parameters
     ----------
     profile : RadarProfile
     position : (n, 3) float
-        Radar frame [m].
+        Where the echo comes from, at half the length of its way; radar frame [m].
     weather : Weather or None
         ``None`` is no attenuation at all.
+    departure : (n, 3) float, optional
+        Directions in which the wave left, where they are others.
 
     Returns
     -------
@@ -35,6 +39,9 @@ def link_amplitude(profile: RadarProfile, position: FloatArray, weather: Weather
     antenna = profile.antenna
     distance, azimuth, elevation = spherical(position)
     one_way = profile.pattern(azimuth, elevation)
+    if departure is not None:
+        _, azimuth, elevation = spherical(departure)
+        one_way = np.sqrt(one_way * profile.pattern(azimuth, elevation))
     gain_db = antenna.gain_tx_dbi + antenna.gain_rx_dbi - antenna.radome_loss_db
     power = profile.tx_power_w * 10 ** (gain_db / 10)
     amplitude: FloatArray = np.sqrt(power) * one_way

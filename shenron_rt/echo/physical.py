@@ -24,6 +24,7 @@ from ..physics.fresnel import backscatter_reflection
 from ..randomness import frame_generator
 from ..returns import Returns
 from ..scatterers import Scatterers
+from .bounced import path_amplitude
 from .glint import glint_sigma0
 from .link import link_amplitude
 
@@ -82,9 +83,8 @@ def physical_returns(scatterers: Scatterers, profile: RadarProfile, materials: M
         return _echoes(part, index[rows], tables, profile, rows.start)
 
     blocks = map_blocks(block, len(scatterers)) or [block(slice(0, 0))]
-    return _assemble(
-        scatterers, [e for kind in (True, False) for b in blocks for e in b if e.coherent == kind], profile
-    )
+    echoes = [e for kind in (True, False) for b in blocks for e in b if e.coherent == kind]
+    return _with_paths(_assemble(scatterers, echoes, profile), scatterers, profile, materials)
 
 
 def _echoes(
@@ -323,4 +323,28 @@ def _assemble(scatterers: Scatterers, echoes: list[_Echo], profile: RadarProfile
         center_hz=profile.center_hz,
         model="physical",
         weather=scatterers.weather,
+    )
+
+
+def _with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile, materials: MaterialTable) -> Returns:
+    """Append the echoes of the ways over several surfaces."""
+    paths = scatterers.paths
+    if paths is None or not len(paths):
+        return returns
+    amplitude = path_amplitude(paths, scatterers.material_names, materials, profile, scatterers.weather)
+    heard = np.flatnonzero(np.abs(amplitude) > 0)
+    paths, amplitude = paths.select(heard), amplitude[heard]
+    half, rate = 0.5 * paths.way[:, None], paths.range_rate[:, None]
+    object_id, tag = paths.owner
+    return replace(
+        returns,
+        amplitude=np.concatenate([returns.amplitude, amplitude]),
+        position=np.concatenate([returns.position, half * paths.arrival]),
+        velocity=np.concatenate([returns.velocity, rate * paths.arrival]),
+        object_id=np.concatenate([returns.object_id, object_id]),
+        tag=np.concatenate([returns.tag, tag]),
+        coherent=np.concatenate([returns.coherent, np.ones(len(heard), dtype=bool)]),
+        bounces=np.concatenate([returns.bounces, paths.count]),
+        scatterer=np.concatenate([returns.scatterer, -1 - heard]),
+        departure=np.concatenate([returns.position, half * paths.departure]),
     )

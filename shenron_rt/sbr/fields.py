@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray, IntArray, NDArray
+from .._typing import ComplexArray, FloatArray, NDArray
 from .chain import Bounce, Chain, dot
 from .surface import Reflector, Surface
 from .views import Views
 
-__all__ = ["Fields", "fields_along", "radiated"]
+__all__ = ["Fields", "fields_along", "radiated", "reflected_field"]
 
 
 class Fields(NamedTuple):
@@ -60,28 +60,42 @@ def _reflected(
     for number, reflector in enumerate(surface.reflectors):
         rows = np.flatnonzero(kind == number)
         if len(rows) and (reflector.coefficients is not None or reflector.roughness_m > 0.0):
-            mirrored[rows] = _by_fresnel(reflector, bounce, rows, field[rows], frequency_hz)
+            d, normal = bounce.direction[rows], bounce.normal[rows]
+            te, tm = _coefficients(reflector, frequency_hz, np.clip(-dot(d, normal), 0.0, 1.0))
+            mirrored[rows] = reflected_field(field[rows], d, normal, te, tm)
     return mirrored
 
 
-def _by_fresnel(
-    reflector: Reflector, bounce: Bounce, rows: IntArray, field: NDArray[np.inexact], frequency_hz: float
+def reflected_field(
+    field: NDArray[np.inexact], direction: FloatArray, normal: FloatArray, te: ComplexArray, tm: ComplexArray
 ) -> ComplexArray:
-    """Split the field into TE and TM, and reflect each.
+    """Return the field of a reflected wave, by its parts across the plane of incidence and in it.
 
+    Parameters
+    ----------
+    field : (n, p, 3)
+        Transverse to the direction of arrival.
+    direction, normal : (n, 3) float
+        Of arrival, and of the surface on the side that is lit; unit vectors.
+    te, tm : (n,) complex
+        Reflection coefficients.
+
+    Returns
+    -------
+    (n, p, 3) complex
+
+    Notes
+    -----
     With e the unit vector across the plane of incidence both waves have TM along e x d, so that their H is along e:
     TM = +1 and TE = -1 make a conductor.
     """
-    d, n = bounce.direction[rows], bounce.normal[rows]
-    cos = np.clip(-dot(d, n), 0.0, 1.0)
-    te, tm = _coefficients(reflector, frequency_hz, cos)
-    across = np.cross(n, d)
-    length = np.linalg.norm(across, axis=1)
-    any_tangent = np.cross(n, np.where(np.abs(n[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    across = np.where(length[:, None] > 1e-9, across, any_tangent)
-    across /= np.linalg.norm(across, axis=1)[:, None]
-    out = d + 2.0 * cos[:, None] * n
-    tm_in, tm_out = np.cross(across, d), np.cross(across, out)
+    across = np.cross(normal, direction)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    any_tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    across = np.where(length > 1e-9, across, any_tangent)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    out = direction - 2.0 * dot(direction, normal)[:, None] * normal
+    tm_in, tm_out = np.cross(across, direction), np.cross(across, out)
     along_te = np.einsum("npi,ni->np", field, across) * te[:, None]
     along_tm = np.einsum("npi,ni->np", field, tm_in) * tm[:, None]
     reflected: ComplexArray = along_te[:, :, None] * across[:, None, :] + along_tm[:, :, None] * tm_out[:, None, :]

@@ -106,23 +106,13 @@ def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:
     Parameters
     ----------
     mesh : TaggedMesh
-        Vertices at one place count as one, whether the file shares them or not.
     reflector : (f,) int
         Faces that reflect differently are never in one group.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    scale = max(float(np.abs(mesh.vertices).max()), 1e-9)
-    _, vertex = np.unique(np.round(mesh.vertices / scale * 1e8).astype(np.int64), axis=0, return_inverse=True)
-    corners = vertex.reshape(-1)[mesh.faces]
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    face = np.repeat(np.arange(mesh.n_faces), 3)
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    ends, face = ends[order], face[order]
-    # neighbours in the sorted list share an edge; an edge of three or more faces joins them one after the other
-    shared = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
-    a, b = face[shared], face[shared + 1]
+    a, b = mesh.adjacent
     bend = np.abs(np.einsum("ij,ij->i", mesh.face_normal[a], mesh.face_normal[b]))
     joined = (bend >= np.cos(SMOOTH_ANGLE)) & (reflector[a] == reflector[b])
     ones = np.ones(int(joined.sum()), dtype=np.int8)

@@ -51,6 +51,17 @@ class Body:
     plane: IntArray
     patch: FloatArray
 
+    @functools.cached_property
+    def bend(self) -> FloatArray:
+        """(f,) mean angle between each face and those beside it where they bend by less than 60 degrees [rad]."""
+        a, b = self.mesh.adjacent
+        normal = self.mesh.face_normal
+        angle = np.arccos(np.clip(np.abs(np.einsum("ij,ij->i", normal[a], normal[b])), 0.0, 1.0))
+        smooth = angle < np.pi / 3
+        faces, angles = np.concatenate([a[smooth], b[smooth]]), np.tile(angle[smooth], 2)
+        count = np.bincount(faces, minlength=self.mesh.n_faces)
+        return np.asarray(np.bincount(faces, angles, self.mesh.n_faces) / np.maximum(count, 1))
+
 
 @dataclass(frozen=True, eq=False)
 class World:
@@ -99,6 +110,11 @@ class World:
     turn: FloatArray
     materials: MaterialTable
     radar_state: BodyState
+
+    @functools.cached_property
+    def face_bend(self) -> FloatArray:
+        """(f,) mean angle between each face and those beside it [rad]."""
+        return _stack([b.bend for b in self.bodies], (0,), np.float64)
 
     @property
     def object_id(self) -> IntArray:

@@ -15,6 +15,7 @@ from ..config.materials import MaterialTable
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
 from ..errors import InputError
+from ..paths import Paths
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
 from ..scene.motion import BodyState
@@ -22,6 +23,7 @@ from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
 from .backend import Backend, choose_backend
+from .bounces import trace_paths
 from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
 
@@ -29,6 +31,9 @@ __all__ = ["trace"]
 
 #: Cosines below this are treated as this: a surface seen edge-on has no usable footprint.
 _MIN_COS = 1e-4
+MOST_BOUNCES = 5
+#: Smallest plane in which aimed bodies are looked for as in a mirror [m^2].
+_MIRROR_M2 = 1.0
 #: One array a column of the scatterers; each has a dtype of its own.
 Columns: TypeAlias = dict[str, NDArray[Any]]
 #: Slack of the visibility test of a point target [m].
@@ -96,7 +101,7 @@ def trace(
     rays : int
         About how many cells cover the antenna pattern down to -40 dB two-way. Objects with ``aim`` get theirs on top.
     max_bounces : int
-        Surfaces along a path; only 1 is built.
+        Surfaces along a path, 1 to 5. With more than 1, ``paths`` of the result holds the ways over several.
     backend : str
         ``"auto"``, ``"cuda"``, ``"llvm"`` or ``"scalar"``.
 
@@ -108,14 +113,14 @@ def trace(
     Raises
     ------
     InputError
-        Unknown radar, fewer than 100 rays, ``max_bounces`` other than 1, and what meshes and materials raise.
+        Unknown radar, fewer than 100 rays, ``max_bounces`` out of bounds, and what meshes and materials raise.
     BackendError
         The backend asked for is not usable here.
     """
     if rays < 100:
         raise InputError(f"rays: at least 100 are needed to cover an antenna pattern, got {rays}")
-    if max_bounces != 1:
-        raise InputError(f"max_bounces: only 1 (first surface) is built, got {max_bounces}")
+    if not 1 <= max_bounces <= MOST_BOUNCES:
+        raise InputError(f"max_bounces: {max_bounces}; allowed: 1 (first surfaces) to {MOST_BOUNCES}")
     mount = scene.radar(radar)
     profile = profile or scene.profile_of(mount)
     run_seed = scene.seed if seed is None else seed
@@ -133,8 +138,14 @@ def trace(
     ]
     rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s))
     columns: dict[str, Any] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
+    bounced = None
+    if max_bounces > 1:
+        wavenumber = 2.0 * np.pi / profile.wavelength_m
+        image = _images(world, caster, aimed, run_seed, frame, mount.name)
+        bounced = _bounced(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
     return Scatterers(
         **columns,
+        paths=bounced,
         material_names=tuple(world.materials.materials),
         weather=None if scene.weather is None else scene.weather.plain(),
         radar=mount.name,
@@ -162,6 +173,84 @@ def _cast(
     hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
     hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
     return parts, hits
+
+
+@dataclass(frozen=True)
+class _Image:
+    """Rays at the mirror image of a body in a plane."""
+
+    body: int
+    plane: int
+    launch: _Launch
+
+
+def _images(
+    world: World, caster: RayCaster, aimed: dict[int, _Launch], seed: int, frame: int, radar: str
+) -> list[_Image]:
+    """Return launches at the mirror images of aimed bodies, in the large planes that show them to the radar."""
+    large = np.flatnonzero(world.face_patch >= _MIRROR_M2)
+    _, pick = np.unique(world.face_plane[large], return_index=True)
+    face = large[pick]
+    images = []
+    for body in aimed:
+        item = world.bodies[body]
+        points = world.vertices[world.vertex_start[body] : world.vertex_start[body + 1]]
+        mirrors = face[world.face_body[face] != body]
+        normal, offset = world.face_normal[mirrors], world.face_offset[mirrors]
+        box = np.stack(np.meshgrid(*np.stack([points.min(axis=0), points.max(axis=0)], axis=1)), axis=-1).reshape(-1, 3)
+        probes = np.concatenate([box.mean(axis=0, keepdims=True), box])
+        height = probes @ normal.T - offset  # of each probe above each plane; the radar is at -offset
+        seen = probes[:, None] - 2.0 * height[:, :, None] * normal
+        both = height * -offset > 0
+        rays = np.ascontiguousarray(seen.reshape(-1, 3).T / np.linalg.norm(seen.reshape(-1, 3), axis=1), np.float32)
+        hit = caster.cast(rays).reshape(both.shape)
+        shown = both & (hit >= 0) & (world.face_plane[hit] == world.face_plane[mirrors])
+        for k in np.flatnonzero(shown.any(axis=0)).tolist():
+            generator = frame_generator(seed, frame, radar, f"image {item.object_id} {item.source.name} {k}")
+            above = points @ normal[k] - offset[k]
+            mirrored = points - 2.0 * above[:, None] * normal[k]
+            cells = aimed_cells(mirrored, item.source.aim or 0, generator.uniform(-0.5, 0.5, 2))
+            if cells is not None:
+                images.append(_Image(body, int(world.face_plane[mirrors[k]]), _Launch(cells, generator)))
+    return images
+
+
+def _bounced(
+    world: World,
+    caster: RayCaster,
+    launches: list[_Launch],
+    parts: list[IntArray],
+    hits: list[IntArray],
+    aimed: list[int],
+    images: list[_Image],
+    max_bounces: int,
+    wavenumber: float,
+) -> Paths:
+    """Return the paths over several surfaces, each seen by one launch only.
+
+    What shows an aimed body in its second hit, in a plane that has rays of its own for that, is left to them.
+    """
+    taken = {(image.plane, image.body) for image in images}
+
+    def not_taken(first: IntArray, second: IntArray) -> BoolArray:
+        keep = np.ones(len(first), dtype=bool)
+        for plane, body in taken:
+            keep &= (world.face_plane[first] != plane) | (world.face_body[second] != body)
+        return keep
+
+    found = [
+        trace_paths(world, caster, launch.cells, part[hit], hit, max_bounces, wavenumber, not_taken)
+        for launch, part, hit in zip(launches, parts, hits, strict=True)
+    ]
+    for image in images:
+        face = caster.cast(_directions([image.launch]))
+        hit = np.flatnonzero((face >= 0) & (world.face_plane[face] == image.plane))
+
+        def shown(first: IntArray, second: IntArray, body: int = image.body) -> BoolArray:
+            return np.asarray(world.face_body[second] == body)
+
+        found.append(trace_paths(world, caster, image.launch.cells, face[hit], hit, max_bounces, wavenumber, shown))
+    return Paths.join(found)
 
 
 @functools.lru_cache(maxsize=4)
