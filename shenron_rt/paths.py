@@ -15,7 +15,7 @@ from .errors import InputError
 __all__ = ["Paths"]
 
 #: Parameters that are not one array with a row a path and a column a hit.
-_PER_PATH = {"count": (), "area": (3,), "slope": (2,), "curvature": (3,)}
+_PER_PATH = {"count": (), "radiates": (), "two_way": (), "area": (3,), "slope": (2,), "curvature": (3,)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +33,13 @@ class Paths:
         Index into the names of the scatterers' materials.
     object_id : (n, b) uint32
     tag : (n, b) uint8
+    radiates : (n,) uint8
+        Column of the hit whose current is integrated; what comes after it are mirrors on the way back.
+    two_way : (n,) bool
+        Whether the path stands for its reverse, too, whose echo is the same by reciprocity.
     area : (n, 3) float
-        Vector area of the last footprint, on the lit side, for a unit of u and v, which run from -1 to 1 over the tube
-        [m^2].
+        Vector area of the footprint that radiates, on the lit side, for a unit of u and v, which run from -1 to 1 over
+        the tube [m^2].
     slope : (n, 2) float
         Derivatives of the whole way there and back over u and v [m].
     curvature : (n, 3) float
@@ -49,6 +53,8 @@ class Paths:
     material: IntArray
     object_id: IntArray
     tag: IntArray
+    radiates: IntArray
+    two_way: BoolArray
     area: FloatArray
     slope: FloatArray
     curvature: FloatArray
@@ -106,6 +112,11 @@ class Paths:
         """(n, 3) the last hit [m]."""
         return np.asarray(self.point[np.arange(len(self)), self.count.astype(np.int64) - 1])
 
+    @property
+    def source(self) -> FloatArray:
+        """(n, 3) the hit that radiates [m]."""
+        return np.asarray(self.point[np.arange(len(self)), self.radiates])
+
     @cached_property
     def legs(self) -> FloatArray:
         """(n, b + 1, 3) vectors from the radar to the first hit, from hit to hit, and back from the last one [m]."""
@@ -149,11 +160,6 @@ class Paths:
         row = np.arange(len(self))
         return self.object_id[row, pick], self.tag[row, pick]
 
-    def labels(self) -> list[str]:
-        """Return the chain of every path by object, such as ``"0>101"`` for a car seen over the road."""
-        ids = self.object_id.tolist()
-        return [">".join(map(str, row[:n])) for row, n in zip(ids, self.count.tolist(), strict=True)]
-
 
 def _unit(vector: FloatArray) -> FloatArray:
     return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-12))
@@ -163,7 +169,7 @@ def _empty(most: int) -> dict[str, NDArray[Any]]:
     shapes = {
         "count": ((), np.uint8), "point": ((most, 3), np.float64), "normal": ((most, 3), np.float64),
         "velocity": ((most, 3), np.float64), "material": ((most,), np.uint16), "object_id": ((most,), np.uint32),
-        "tag": ((most,), np.uint8), "area": ((3,), np.float64), "slope": ((2,), np.float64),
-        "curvature": ((3,), np.float64),
+        "tag": ((most,), np.uint8), "radiates": ((), np.uint8), "two_way": ((), np.bool_), "area": ((3,), np.float64),
+        "slope": ((2,), np.float64), "curvature": ((3,), np.float64),
     }  # fmt: skip
     return {name: np.zeros((0, *shape), dtype=dtype) for name, (shape, dtype) in shapes.items()}

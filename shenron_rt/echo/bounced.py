@@ -32,7 +32,12 @@ _FEW_NODES, _NARROW = 8, 6.0
 
 
 def path_amplitude(
-    paths: Paths, names: tuple[str, ...], materials: MaterialTable, profile: RadarProfile, weather: Weather | None
+    paths: Paths,
+    names: tuple[str, ...],
+    materials: MaterialTable,
+    profile: RadarProfile,
+    weather: Weather | None,
+    polarization: str,
 ) -> ComplexArray:
     """Return the de-chirped amplitudes of paths, without the carrier phase of their way.
 
@@ -44,6 +49,8 @@ def path_amplitude(
     materials : MaterialTable
     profile : RadarProfile
     weather : Weather or None
+    polarization : {"VV", "HH", "HV", "VH"}
+        Receive letter first.
 
     Returns
     -------
@@ -58,55 +65,63 @@ def path_amplitude(
         part = paths.select(rows)
         legs = part.legs
         length = np.linalg.norm(legs, axis=2)
-        back = np.linalg.norm(part.last, axis=1)
-        there = length.sum(axis=1) - back
-        strength = _strength(part, legs / np.maximum(length, 1e-12)[:, :, None], worn, profile)
+        there = np.where(np.arange(length.shape[1]) <= part.radiates[:, None], length, 0.0).sum(axis=1)
+        back = length.sum(axis=1) - there
+        unit = legs / np.maximum(length, 1e-12)[:, :, None]
+        strength = _strength(part, unit, worn, profile.center_hz, polarization)
         integral = tube_phase_integral(part.slope, part.curvature, wavenumber)
         link = link_amplitude(profile, 0.5 * part.way[:, None] * part.arrival, weather, departure=part.departure)
-        sigma_root = wavenumber / (2.0 * math.sqrt(math.pi)) * strength * integral
+        # a metal plate has Gamma = -1, and its current the sign of what arrives
+        sigma_root = -wavenumber / (2.0 * math.sqrt(math.pi)) * strength * integral
         # the one conjugation from e^{+jwt} echo phasors to the de-chirped signal conj(rx) tx
         return np.asarray(np.conj(link * profile.wavelength_m / math.sqrt(FOUR_PI_CUBED) * sigma_root / (there * back)))
 
     return np.concatenate(map_blocks(block, len(paths), 4096) or [np.zeros(0, dtype=np.complex128)])
 
 
-def _strength(paths: Paths, unit: FloatArray, materials: list[Material], profile: RadarProfile) -> ComplexArray:
-    """Return (n,) what the last footprint sends back for a unit of u and v [m^2]."""
-    send, receive = ("VH".index(p) for p in reversed(profile.antenna.polarization))
+def _strength(
+    paths: Paths, unit: FloatArray, materials: list[Material], frequency_hz: float, polarization: str
+) -> ComplexArray:
+    """Return (n,) what the footprint that radiates sends back for a unit of u and v [m^2]."""
+    receive, send = ("VH".index(letter) for letter in polarization)
+    row = np.arange(len(paths))
+    ends, last = paths.radiates.astype(np.int64), paths.count.astype(np.int64) - 1
     field = _basis(unit[:, 0])[:, [send]].astype(np.complex128)
-    result = np.zeros(len(paths), dtype=np.complex128)
-    toward = -paths.arrival
-    basis = _basis(paths.arrival)
+    arriving, leaving = field.copy(), field.copy()
     for order in range(paths.object_id.shape[1]):
-        rows = np.flatnonzero(paths.hit[:, order])
-        arriving, d, n = field[rows], unit[rows, order], paths.normal[rows, order]
-        leaving = _reflected(arriving, d, n, paths.material[rows, order], materials, profile)
-        field[rows] = leaving
-        ends = np.flatnonzero(paths.count[rows] == order + 1)
-        at = rows[ends]
-        both = [np.repeat(f[ends], 2, axis=1) for f in (arriving, leaving)]  # transmitted V and H alike
-        matrix = radiated(both[0], both[1], d[ends], n[ends], paths.area[at], toward[at], basis[at])
-        result[at] = matrix[:, receive, 0]
-    return result
+        rows = np.flatnonzero(order <= ends)
+        arriving[rows] = field[rows]
+        field[rows] = _reflected(paths, rows, order, field[rows], unit[rows, order], materials, frequency_hz)
+        leaving[rows] = field[rows]
+    # by reciprocity the receiver's vector is carried backwards over the mirrors behind the radiating hit
+    ear = _basis(paths.arrival)[:, [receive]].astype(np.complex128)
+    for order in reversed(range(paths.object_id.shape[1])):
+        rows = np.flatnonzero((order > ends) & (order <= last))
+        ear[rows] = _reflected(paths, rows, order, ear[rows], -unit[rows, order + 1], materials, frequency_hz)
+    pair = [np.repeat(f, 2, axis=1) for f in (arriving, leaving, ear)]  # radiated() takes V and H
+    toward, d, n = unit[row, ends + 1], unit[row, ends], paths.normal[row, ends]
+    return np.asarray(radiated(pair[0], pair[1], d, n, paths.area, toward, pair[2])[:, 0, 0])
 
 
 def _reflected(
+    paths: Paths,
+    rows: IntArray,
+    order: int,
     field: ComplexArray,
-    d: FloatArray,
-    n: FloatArray,
-    material: IntArray,
+    direction: FloatArray,
     materials: list[Material],
-    profile: RadarProfile,
+    frequency_hz: float,
 ) -> ComplexArray:
+    """Return fields (m, 1, 3) after their reflection at one of the hits of some paths."""
     result = np.empty_like(field)
-    cos = np.clip(-np.einsum("ij,ij->i", d, n), 0.0, 1.0)
+    normal, material = paths.normal[rows, order], paths.material[rows, order]
+    cos = np.clip(-np.einsum("ij,ij->i", direction, normal), 0.0, 1.0)
+    wavenumber = 2.0 * math.pi * frequency_hz / SPEED_OF_LIGHT
     for number in np.flatnonzero(np.bincount(material)) if len(material) else ():
-        rows = np.flatnonzero(material == number)
-        te, tm = materials[number].reflection(profile.center_hz, cos[rows])
-        rough = coherent_factor(
-            2.0 * math.pi * profile.center_hz / SPEED_OF_LIGHT, materials[number].roughness_rms_m, cos[rows]
-        )
-        result[rows] = reflected_field(field[rows], d[rows], n[rows], te * rough, tm * rough)
+        here = np.flatnonzero(material == number)
+        te, tm = materials[number].reflection(frequency_hz, cos[here])
+        rough = coherent_factor(wavenumber, materials[number].roughness_rms_m, cos[here])
+        result[here] = reflected_field(field[here], direction[here], normal[here], te * rough, tm * rough)
     return result
 
 

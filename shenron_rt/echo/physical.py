@@ -331,20 +331,28 @@ def _with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile,
     paths = scatterers.paths
     if paths is None or not len(paths):
         return returns
-    amplitude = path_amplitude(paths, scatterers.material_names, materials, profile, scatterers.weather)
-    heard = np.flatnonzero(np.abs(amplitude) > 0)
-    paths, amplitude = paths.select(heard), amplitude[heard]
+    antenna = profile.antenna.polarization
+    arguments = (scatterers.material_names, materials, profile, scatterers.weather)
+    forth = path_amplitude(paths, *arguments, antenna)
+    turned = np.flatnonzero(paths.two_way)
+    back = path_amplitude(paths.select(turned), *arguments, antenna[::-1])
+    row = np.concatenate([np.arange(len(paths)), turned])
+    amplitude = np.concatenate([forth, back])
+    paths = paths.select(row)
+    reverse = (np.arange(len(row)) >= len(forth))[:, None]
+    arrival = np.where(reverse, paths.departure, paths.arrival)
+    departure = np.where(reverse, paths.arrival, paths.departure)
     half, rate = 0.5 * paths.way[:, None], paths.range_rate[:, None]
     object_id, tag = paths.owner
     return replace(
         returns,
         amplitude=np.concatenate([returns.amplitude, amplitude]),
-        position=np.concatenate([returns.position, half * paths.arrival]),
-        velocity=np.concatenate([returns.velocity, rate * paths.arrival]),
+        position=np.concatenate([returns.position, half * arrival]),
+        velocity=np.concatenate([returns.velocity, rate * arrival]),
         object_id=np.concatenate([returns.object_id, object_id]),
         tag=np.concatenate([returns.tag, tag]),
-        coherent=np.concatenate([returns.coherent, np.ones(len(heard), dtype=bool)]),
+        coherent=np.concatenate([returns.coherent, np.ones(len(row), dtype=bool)]),
         bounces=np.concatenate([returns.bounces, paths.count]),
-        scatterer=np.concatenate([returns.scatterer, -1 - heard]),
-        departure=np.concatenate([returns.position, half * paths.departure]),
+        scatterer=np.concatenate([returns.scatterer, -1 - row]),
+        departure=np.concatenate([returns.position, half * departure]),
     )

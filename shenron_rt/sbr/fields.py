@@ -120,7 +120,7 @@ def radiated(
     normal: FloatArray,
     area: FloatArray,
     toward: FloatArray,
-    receive: FloatArray,
+    receive: NDArray[np.inexact],
 ) -> NDArray[np.inexact]:
     """Return what the currents on flat pieces send to a receiver, without their phase.
 
@@ -134,7 +134,7 @@ def radiated(
         Vector area of each piece on the side that is lit [m^2].
     toward : (n, 3) float
         Unit vector to the receiver.
-    receive : (n, 2, 3) float
+    receive : (n, 2, 3)
         Unit vectors p, V and H of the receiver, transverse to ``toward``.
 
     Returns
@@ -158,7 +158,7 @@ def radiated(
 
 
 def _electric(
-    field: NDArray[np.inexact], direction: FloatArray, area: FloatArray, receive: FloatArray
+    field: NDArray[np.inexact], direction: FloatArray, area: FloatArray, receive: NDArray[np.inexact]
 ) -> NDArray[np.inexact]:
     """Return p . (S x (d x E)) = (p . d)(S . E) - (p . E)(S . d), (n, 2, 2)."""
     result = np.empty((len(field), 2, 2), dtype=field.dtype)

@@ -3,6 +3,11 @@
 A tube keeps its cell of solid angle; every flat facet mirrors it, so that it seems to come from an image of the radar.
 Of the ways back only those are kept whose phase is nearly stationary somewhere in the tube: on a smooth surface the
 others cancel against their neighbours.
+
+Rays know nothing of diffraction, so a current is integrated where the light is still that of a mirror larger than its
+Fresnel zone, or of the corner itself. A small body seen over a road radiates itself: towards the radar, whose way is
+also that of the reverse path, and towards the radar's image below the road. What rays would draw, a beam from the body
+as narrow as its shadow that lights a strip of road, would be too strong by the ratio of the distances.
 """
 
 from __future__ import annotations
@@ -18,8 +23,10 @@ from ..scene.world import World
 from .caster import RayCaster
 from .launch import Cells
 
-__all__ = ["trace_paths"]
+__all__ = ["MIRROR_M2", "trace_paths"]
 
+#: Smallest flat piece of surface that counts as a mirror: larger than its Fresnel zone wherever a radar looks [m^2].
+MIRROR_M2 = 1.0
 #: Height above a surface at which reflected rays start, and its growth with distance (float32 coordinates) [m].
 _LIFT_M, _LIFT_PER_M = 2e-5, 1e-5
 #: Phase over half a tube, beyond that of its curvature, up to which a tube is kept [rad].
@@ -144,22 +151,70 @@ def _bounced(world: World, caster: RayCaster, tubes: _Tubes) -> _Tubes:
 
 def _paths(world: World, caster: RayCaster, tubes: _Tubes, wavenumber: float) -> Paths:
     """Return the ways back from the last hits of tubes to the radar that matter."""
-    kept = _nearly_stationary(world, tubes, wavenumber)
-    tubes = tubes.select(kept)
+    mirror = [world.face_patch[face] >= MIRROR_M2 for face in tubes.faces]
+    beamless = np.flatnonzero(~mirror[-1] | mirror[-2])
+    over = np.flatnonzero(mirror[0] & ~mirror[-1])
+    radar = np.zeros(3)
+    direct = _received(world, caster, tubes.select(beamless), np.tile(radar, (len(beamless), 1)), None, wavenumber)
+    plane = tubes.faces[0][over]
+    image = 2.0 * world.face_offset[plane][:, None] * world.face_normal[plane]  # of the radar, which is the origin
+    reflected = _received(world, caster, tubes.select(over), image, plane, wavenumber)
+    return Paths.join([direct, reflected])
+
+
+def _received(
+    world: World, caster: RayCaster, tubes: _Tubes, eye: FloatArray, plane: IntArray | None, wavenumber: float
+) -> Paths:
+    """Return the paths from the last hits of tubes to the radar at ``eye`` (n, 3), or its images in planes."""
+    kept = _nearly_stationary(world, tubes, eye, wavenumber)
+    tubes, eye = tubes.select(kept), eye[kept]
     normal = _facing(world, tubes.faces[-1], tubes.direction)
-    point = tubes.points[-1]
-    origin = _lifted(point, normal)
-    distance = np.linalg.norm(point, axis=1)
-    face = _cast(caster, origin, -origin)  # towards the radar, which nothing behind may hide
+    if plane is None:
+        free = _reaches(world, caster, _lifted(tubes.points[-1], normal), eye)
+    else:
+        plane = plane[kept]
+        free, back = _reflected_back(world, caster, _lifted(tubes.points[-1], normal), eye, plane)
+        plane, back = plane[free], back[free]
+    tubes, eye, normal = tubes.select(free), eye[free], normal[free]
+    share = _share(world, tubes, normal, wavenumber)
+    tubes = replace(tubes, edges=tubes.edges * share[:, None, None])
+    slope, curvature, flat = _expanded(tubes, normal, eye)
+    radiates = len(tubes.faces) - 1
+    tubes = tubes.select(flat)
+    edges = _footprint(normal[flat], tubes)
+    area = np.cross(edges[:, 0], edges[:, 1])
+    area *= (np.sign(np.einsum("ij,ij->i", area, normal[flat])) / share[flat])[:, None]
+    if plane is not None:
+        tubes = replace(tubes, faces=(*tubes.faces, plane[flat]), points=(*tubes.points, back[flat]))
+    return _assembled(world, tubes, radiates, area, slope[flat], curvature[flat])
+
+
+def _reaches(world: World, caster: RayCaster, start: FloatArray, end: FloatArray) -> IntArray:
+    """Return the rows of pairs of points with nothing between them."""
+    way = end - start
+    length = np.linalg.norm(way, axis=1)
+    face = _cast(caster, start, way / np.maximum(length, 1e-12)[:, None])
     plane = world.face_normal[face]
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = (world.face_offset[face] - np.einsum("ij,ij->i", plane, origin)) / np.einsum("ij,ij->i", plane, -origin)
-    free = np.flatnonzero((face < 0) | ~(reach * distance < distance))
-    tubes = tubes.select(free)
-    share = _share(world, tubes, normal[free], wavenumber)
-    tubes = replace(tubes, edges=tubes.edges * share[:, None, None])
-    slope, curvature, flat = _expanded(tubes, normal[free])
-    return _assembled(world, tubes.select(flat), slope[flat], curvature[flat], share[flat])
+        reach = (world.face_offset[face] - np.einsum("ij,ij->i", plane, start)) / np.einsum("ij,ij->i", plane, way)
+    return np.flatnonzero((face < 0) | ~(reach < 1.0))
+
+
+def _reflected_back(
+    world: World, caster: RayCaster, start: FloatArray, image: FloatArray, face: IntArray
+) -> tuple[IntArray, FloatArray]:
+    """Return which points see the radar in the planes of some faces, and (n, 3) where on them."""
+    normal = world.face_normal[face]
+    way = image - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (world.face_offset[face] - np.einsum("ij,ij->i", normal, start)) / np.einsum("ij,ij->i", normal, way)
+    where = start + np.nan_to_num(share)[:, None] * way
+    seen = _cast(caster, start, way / np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None])
+    shown = (share > 0) & (share < 1) & (seen >= 0) & (world.face_plane[seen] == world.face_plane[face])
+    rows = np.flatnonzero(shown)
+    towards = _facing(world, face[rows], where[rows])  # light from the radar arrives along ``where``
+    origin = _lifted(where[rows], towards)
+    return rows[_reaches(world, caster, origin, np.zeros_like(origin))], where
 
 
 def _share(world: World, tubes: _Tubes, normal: FloatArray, wavenumber: float) -> FloatArray:
@@ -184,8 +239,8 @@ def _footprint(normal: FloatArray, tubes: _Tubes) -> FloatArray:
     return np.asarray(tubes.length[:, None, None] * across)
 
 
-def _nearly_stationary(world: World, tubes: _Tubes, wavenumber: float) -> IntArray:
-    point = tubes.points[-1]
+def _nearly_stationary(world: World, tubes: _Tubes, eye: FloatArray, wavenumber: float) -> IntArray:
+    point = tubes.points[-1] - eye
     distance = np.linalg.norm(point, axis=1)
     normal = _facing(world, tubes.faces[-1], tubes.direction)
     lit = np.einsum("ij,ij->i", normal, point) < 0  # the radar is on the side that is lit
@@ -195,8 +250,8 @@ def _nearly_stationary(world: World, tubes: _Tubes, wavenumber: float) -> IntArr
     return np.flatnonzero(lit & np.all(slope <= bend + _MARGIN / wavenumber, axis=1))
 
 
-def _expanded(tubes: _Tubes, normal: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return first and second derivatives of the way over the tubes, from its exact value at nine points.
+def _expanded(tubes: _Tubes, normal: FloatArray, eye: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return first and second derivatives of the way to ``eye`` over tubes, from its exact value at nine points.
 
     Returns
     -------
@@ -216,7 +271,7 @@ def _expanded(tubes: _Tubes, normal: FloatArray) -> tuple[FloatArray, FloatArray
             good &= np.isfinite(reach) & (reach > 0)
             reach = np.where(good, reach, 1.0)
             there = tubes.image + reach[:, None] * w
-            way[i, j] = reach * np.linalg.norm(w, axis=1) + np.linalg.norm(there, axis=1)
+            way[i, j] = reach * np.linalg.norm(w, axis=1) + np.linalg.norm(there - eye, axis=1)
     slope = np.stack([way[2, 1] - way[0, 1], way[1, 2] - way[1, 0]], axis=1) / 2.0
     curvature = np.stack(
         [
@@ -229,26 +284,28 @@ def _expanded(tubes: _Tubes, normal: FloatArray) -> tuple[FloatArray, FloatArray
     return slope, curvature, np.flatnonzero(good)
 
 
-def _assembled(world: World, tubes: _Tubes, slope: FloatArray, curvature: FloatArray, share: FloatArray) -> Paths:
+def _assembled(
+    world: World, tubes: _Tubes, radiates: int, area: FloatArray, slope: FloatArray, curvature: FloatArray
+) -> Paths:
+    n = len(area)
     faces = np.stack(tubes.faces, axis=1)
     point = np.stack(tubes.points, axis=1)
     body = world.face_body[faces]
-    velocity = world.drift[body] + np.cross(world.turn[body], point)
-    before = np.concatenate([np.zeros((len(point), 1, 3)), point[:, :-1]], axis=1)
+    before = np.concatenate([np.zeros((n, 1, 3)), point[:, :-1]], axis=1)
     normal = world.face_normal[faces]
     side = np.einsum("nbi,nbi->nb", normal, point - before)
-    normal = normal * np.where(side > 0, -1.0, 1.0)[:, :, None]
-    edges = _footprint(normal[:, -1], tubes)
-    area = np.cross(edges[:, 0], edges[:, 1])
-    area *= (np.sign(np.einsum("ij,ij->i", area, normal[:, -1])) / share)[:, None]
+    mirror = world.face_patch[faces] >= MIRROR_M2
+    last = faces.shape[1] - 1
     return Paths(
-        count=np.full(len(point), faces.shape[1], dtype=np.uint8),
+        count=np.full(n, faces.shape[1], dtype=np.uint8),
         point=point,
-        normal=normal,
-        velocity=velocity,
+        normal=normal * np.where(side > 0, -1.0, 1.0)[:, :, None],
+        velocity=world.drift[body] + np.cross(world.turn[body], point),
         material=world.face_material[faces],
         object_id=world.object_id[body],
         tag=world.face_tag[faces],
+        radiates=np.full(n, radiates, dtype=np.uint8),
+        two_way=(mirror[:, 0] & ~mirror[:, radiates]) if radiates == last else np.zeros(n, dtype=bool),
         area=area,
         slope=slope,
         curvature=curvature,

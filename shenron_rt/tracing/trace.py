@@ -23,7 +23,7 @@ from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
 from .backend import Backend, choose_backend
-from .bounces import trace_paths
+from .bounces import MIRROR_M2, trace_paths
 from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
 
@@ -32,8 +32,6 @@ __all__ = ["trace"]
 #: Cosines below this are treated as this: a surface seen edge-on has no usable footprint.
 _MIN_COS = 1e-4
 MOST_BOUNCES = 5
-#: Smallest plane in which aimed bodies are looked for as in a mirror [m^2].
-_MIRROR_M2 = 1.0
 #: One array a column of the scatterers; each has a dtype of its own.
 Columns: TypeAlias = dict[str, NDArray[Any]]
 #: Slack of the visibility test of a point target [m].
@@ -188,7 +186,7 @@ def _images(
     world: World, caster: RayCaster, aimed: dict[int, _Launch], seed: int, frame: int, radar: str
 ) -> list[_Image]:
     """Return launches at the mirror images of aimed bodies, in the large planes that show them to the radar."""
-    large = np.flatnonzero(world.face_patch >= _MIRROR_M2)
+    large = np.flatnonzero(world.face_patch >= MIRROR_M2)
     _, pick = np.unique(world.face_plane[large], return_index=True)
     face = large[pick]
     images = []
