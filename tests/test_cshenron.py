@@ -120,11 +120,40 @@ def test_the_image_of_every_view_from_its_points(ref: Reference, view: int) -> N
     adc = synthesize_released(radar, points.rho, points.theta, loss)
     assert _rms(adc[:1], direct_sum(radar, points.rho, points.theta, loss, chirps=slice(1))) < 1e-6
     image, expected = dsp.cartesian_image(dsp.range_angle(adc)), ref[f"tic_v{view:03d}_cart"]
-    # Front: the tolerance asked for. The side views hold few points, and the phases of the public code, rounded to
-    # single precision, leave spurs at the angle of the strongest, 2.2e-3 of the peak where there is no point at all.
-    assert _of_peak(image, expected) < (1e-3 if view == 0 else 3e-3)
+    # Asked for is 1e-3 of the peak. The rear and left views hold so few points that the rounding of the public code's
+    # phases stands above it, 2.2e-3 and 1.5e-3 where there is no point at all; the test below has it to the digit.
+    assert _of_peak(image, expected) < (1e-3 if view in (0, 90) else 3e-3)
     peak = np.unravel_index(expected.argmax(), expected.shape)
     assert image[peak] == pytest.approx(expected[peak], rel=1e-3)
+
+
+def _single_precision(radar: ReleasedRadar, rho: np.ndarray, theta: np.ndarray, loss: np.ndarray) -> np.ndarray:
+    """Return one chirp (1, channels, samples) of ``direct_sum``, delay and phases rounded to single precision."""
+    single, turn, slope = np.float32, np.float32(2 * np.pi), np.float32(radar.slope)
+    carrier, half = single(radar.start_hz), single(radar.slope / 2)
+    t = (np.arange(radar.samples) / radar.sample_rate_hz).astype(single)
+    tau = 2 * rho.astype(single) / single(3e8)
+    step = 0.5 / radar.start_hz * np.cos(theta)  # half a wavelength to the right, as a delay
+    delta = (np.arange(radar.channels)[:, None] * step).astype(single)
+    sweep = np.exp(1j * (turn * (carrier * tau + slope * tau * t[:, None] - half * tau * tau)).astype(np.complex64))
+    total = np.zeros((1, radar.channels, radar.samples), dtype=np.complex128)
+    for p, amplitude in enumerate((radar.scale * np.sqrt(loss) / rho).astype(single)):
+        d = delta[:, p : p + 1]
+        beam = turn * (carrier * d - half * d * d - slope * tau[p] * d + slope * d * t)
+        total[0] += amplitude * sweep[:, p] * np.exp(1j * beam.astype(np.complex64))
+    return total
+
+
+@pytest.mark.parametrize("view", VIEWS_DEG)
+def test_the_same_sum_in_single_precision_has_the_public_spurs_of_every_view(ref: Reference, view: int) -> None:
+    points, radar = view_points(ref["points"], view), _radar("tic")
+    loss = released_loss(points.cosine, points.polar_angle, points.material, radar.start_hz)
+    adc = np.repeat(_single_precision(radar, points.rho, points.theta, loss), radar.chirps, axis=0)
+    # 1e-3 is asked; measured are 2e-6 to 8e-6. A phase of 5e4 cycles has steps of 4e-3 cycles in single precision, so
+    # one delay rounded the other way is another draw of the spurs: 3e-4 in a view of 24 points.
+    assert _of_peak(dsp.cartesian_image(dsp.range_angle(adc)), ref[f"tic_v{view:03d}_cart"]) < 1e-4
+    if view == 0:
+        assert _rms(adc, ref["tic_v000_adc"]) < 1e-4  # measured 8e-6; double precision is 4.8e-3 away
 
 
 def test_cfar_on_magnitude_and_on_squares(ref: Reference) -> None:
