@@ -83,9 +83,10 @@ class Scatterers:
     velocity : (n, 3) float or None
         Velocity relative to the radar, in its (turning) frame [m/s].
     normal : (n, 3) float or None
-        Unit normal facing the radar.
+        Unit normal facing the radar; 0 0 0 where it is not known.
     slope : (n,) float or None
-        RMS slope of the surface about ``normal`` across the row, as a tangent; for rows without footprint.
+        RMS slope of the surface about ``normal`` across the row, as a tangent; for rows without footprint. Where it is
+        above 0, a row without a normal has the mirror-like part that its cosine says.
     material : (n,) uint16 or None
         Index into ``material_names``.
     material_names : tuple of str

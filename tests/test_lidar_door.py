@@ -11,10 +11,12 @@ import pytest
 from lidar_tools import CAR_ID, HEIGHT_M, WALL_X, street, write_bin
 
 import shenron_rt as srt
-from shenron_rt.echo.glint import GLINT_SLOPE, glint_sigma0
+from shenron_rt.echo.glint import GLINT_SLOPE, cone_sigma0, glint_sigma0
 from shenron_rt.errors import InputError
 from shenron_rt.lidar import lidar_scatterers
 from shenron_rt.lidar.door import door_counts
+from shenron_rt.lidar.grid import LidarGrid
+from shenron_rt.lidar.normals import estimate_normals
 
 ROOF = srt.Pose((0.3, 0.0, HEIGHT_M))
 BUMPER = srt.Pose((2.0, 0.0, 1.0))
@@ -163,6 +165,47 @@ def test_the_glint_of_a_sphere_is_pi_a_squared() -> None:
     area = (a**2 * np.sin(theta) * (0.6 / 1200) * (2 * np.pi / 180)).reshape(-1)
     # sec^4 under the lobe adds of the order of s^2 = 1.2e-3
     assert np.sum(_mirror(out * a + [far, 0, 0], out) * area) == pytest.approx(math.pi * a**2, rel=4 * GLINT_SLOPE**2)
+
+
+def _cone(points: np.ndarray, normal: np.ndarray, lidar: tuple[float, ...], slope: float = 0.01) -> np.ndarray:
+    """Return sigma0 of metal whose normals nobody knows, seen from the radar at the origin and a LiDAR elsewhere."""
+    line = points - np.asarray(lidar)
+    line /= np.linalg.norm(line, axis=1)[:, None]
+    u = points / np.linalg.norm(points, axis=1)[:, None]
+    metal, n = np.full(len(points), -1.0 + 0j), len(points)
+    cosine = np.clip(-np.einsum("ij,ij->i", normal, line), 0.0, 1.0)
+    return cone_sigma0(metal, -metal, cosine, line, u, np.zeros(n), np.full(n, slope))
+
+
+@pytest.mark.parametrize(
+    ("lidar", "bound_db"),
+    # from the radar's own place the cosine is all there is to know; from a roof the mean over the cone is not what the
+    # plate is, and errs by 1.2 dB at 10 m
+    [((0.0, 0.0, 0.0), 1e-3), ((-2.0, 0.0, 1.4), 1.5), ((-2.0, 0.0, 2.8), 0.5)],
+)
+def test_the_glint_of_a_plate_follows_from_its_cosines_alone(lidar: tuple[float, ...], bound_db: float) -> None:
+    h, step = 10.0, 0.05
+    y, z = (g.reshape(-1) for g in np.meshgrid(*[np.arange(-10, 10, step) + step / 2] * 2))
+    points = np.column_stack([np.full(y.size, h), y, z])
+    sigma0 = _cone(points, np.broadcast_to([-1.0, 0.0, 0.0], points.shape), lidar)
+    sigma = np.sum(sigma0 * step**2 * (h / np.linalg.norm(points, axis=1)) ** 4)
+    assert abs(10 * np.log10(sigma / (math.pi * h**2))) < bound_db
+
+
+def test_a_pole_of_one_column_says_nothing_of_its_mirror_line_and_a_wall_that_goes_on_does() -> None:
+    # 0.5 degrees of azimuth and of elevation; the same cosines, as if both faced the LiDAR
+    column, row = np.radians(np.arange(-2, 3) * 0.5), np.radians(np.arange(-4, 5) * 0.5)
+    for columns, expected in ((column[:1], 0), (column, 3 * 9)):
+        az, el = (g.reshape(-1) for g in np.meshgrid(columns, row))
+        points = 10 * np.column_stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+        n = len(points)
+        frame = srt.LidarFrame(
+            position=points, cos_incidence=np.linspace(1.0, 0.2, n), object_id=np.ones(n, np.uint32),
+            tag=np.full(n, srt.SemanticTag.Walls, np.uint8), area=np.ones(n), grid=LidarGrid(9, 2.0, -2.0, 0.5),
+        )  # fmt: skip
+        normal, slope = estimate_normals(frame, flatness=0.0)  # no plane is flat enough
+        assert not normal.any()
+        assert np.count_nonzero(slope) == expected
 
 
 def test_a_metal_car_is_dark_without_normals_and_lit_with_them(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._typing import FloatArray, IntArray
-from ..echo.glint import glint_sigma0
+from ..echo.glint import points_sigma0
 from .sides import Side
 
 __all__ = ["COSINES", "Palette", "material_index", "mirror_sigma0"]
@@ -63,8 +63,7 @@ def mirror_sigma0(side: Side) -> FloatArray:
         material = side.materials[_in_weather(side, names[i])]
         te[here], tm[here] = material.reflection(profile.center_hz, np.maximum(s.cos_incidence[here], 1e-6))
         height[here] = 2 * math.pi / profile.wavelength_m * material.roughness_rms_m
-    direction = s.position / np.maximum(s.range, 1e-12)[:, None]
-    return glint_sigma0(te, tm, s.normal, direction, height, profile.antenna.polarization, s.slope)
+    return points_sigma0(s, np.arange(len(s)), te, tm, height, profile.antenna.polarization)
 
 
 def _in_weather(side: Side, name: str) -> str:

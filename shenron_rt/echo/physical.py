@@ -25,7 +25,7 @@ from ..randomness import frame_generator
 from ..returns import Returns
 from ..scatterers import Scatterers
 from .bounced import path_amplitude
-from .glint import glint_sigma0
+from .glint import points_sigma0
 from .link import link_amplitude
 
 if TYPE_CHECKING:
@@ -272,9 +272,8 @@ def _incoherent(scatterers: Scatterers, rows: IntArray, light: _Light, curves: _
     sigma0 = curves.sigma0
     if scatterers.footprint is None and scatterers.normal is not None:  # points of a LiDAR: no tubes to integrate over
         height_phase = 2.0 * math.pi * profile.center_hz / SPEED_OF_LIGHT * curves.roughness_m
-        geometry = (scatterers.normal[rows], light.direction[rows], height_phase)
-        spread = None if scatterers.slope is None else scatterers.slope[rows]
-        sigma0 = sigma0 + glint_sigma0(curves.te, curves.tm, *geometry, profile.antenna.polarization, spread)
+        polarization = profile.antenna.polarization
+        sigma0 = sigma0 + points_sigma0(scatterers, rows, curves.te, curves.tm, height_phase, polarization)
     lit = np.flatnonzero(sigma0 > 0)
     source = rows[lit]
     root = np.sqrt(sigma0[lit] * scatterers.area[source])

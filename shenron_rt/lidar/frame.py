@@ -135,7 +135,7 @@ class LidarFrame:
         )
 
     def without_normals(self) -> Self:
-        """Return the frame with "none" for every normal, so that the recorded cosines are used everywhere."""
+        """Return the frame with "none" for every normal: recorded cosines everywhere, and no mirror-like part."""
         return replace(
             self,
             normal=np.zeros_like(self.position),

@@ -20,6 +20,10 @@ _REACH_CELLS = 3.0
 #: Neighbours whose recorded cosine differs by this much count 1/e: they lie on another facet.
 _COSINE_WIDTH = 0.15
 _FEWEST = 3
+#: A neighbour further than this to a side is of the next column or row [cells].
+_APART_CELLS = 0.5
+#: Of the slope of a row without a normal that has neighbours all around [rad].
+_LEAST_SLOPE = 1e-3
 #: Neighbourhoods narrower than this are lines: LAZ rounds to 1 mm [m].
 _WIDTH_M = 0.005
 #: Directions around the line of sight that are tried; a parabola through the best three refines it.
@@ -45,7 +49,9 @@ def estimate_normals(frame: LidarFrame, *, neighbours: int = 8, flatness: float 
         Unit normals facing the sensor, in the frame's axes; 0 0 0 where the neighbours are fewer than three, lie on a
         line, or are not flat.
     slope : (n,) float
-        Half the RMS turn of the normal to the neighbouring points: the slopes that lie between the samples.
+        Half the RMS turn of the normal to the neighbouring points: the slopes that lie between the samples. Without a
+        normal it is half the RMS difference of the recorded angles, of which no turn is less, where the object goes on
+        to both sides and above or below; elsewhere 0: it may bend by any angle within the cell, as a pole does.
 
     Raises
     ------
@@ -63,10 +69,14 @@ def estimate_normals(frame: LidarFrame, *, neighbours: int = 8, flatness: float 
         return np.zeros((len(frame), 3)), np.zeros(len(frame))
     from .._parallel import map_blocks
 
-    index, weight = _neighbours(frame, neighbours)
+    cells = _cells(frame)
+    index, nearness = _neighbours(frame, cells, neighbours)
+    change = (frame.cos_incidence[index] - frame.cos_incidence[:, None]) / _COSINE_WIDTH
+    weight = nearness * np.exp(-(change**2))
     blocks = map_blocks(lambda rows: _fit(frame, rows, index[rows], weight[rows], flatness), len(frame))
     normal = np.concatenate(blocks)
-    return normal, _slope(normal, index, weight)
+    known = np.any(normal != 0, axis=1)
+    return normal, np.where(known, _slope(normal, index, weight), _least_slope(frame, cells, index, nearness))
 
 
 def _slope(normal: FloatArray, index: IntArray, weight: FloatArray) -> FloatArray:
@@ -78,17 +88,26 @@ def _slope(normal: FloatArray, index: IntArray, weight: FloatArray) -> FloatArra
     return slope
 
 
-def _neighbours(frame: LidarFrame, count: int) -> tuple[IntArray, FloatArray]:
-    """Return (n, count) indices of neighbours and their weights; 0 is not of this surface."""
+def _least_slope(frame: LidarFrame, cells: FloatArray, index: IntArray, nearness: FloatArray) -> FloatArray:
+    """Return half the RMS difference of the recorded angles; 0 where the object is no wider or higher than a cell."""
+    near = nearness > 0
+    x, y, z = (cells[index, k] for k in range(3))
+    beside = (cells[:, :1] * y - cells[:, 1:2] * x) / np.maximum(np.hypot(cells[:, :1], cells[:, 1:2]), 1e-9)
+    goes_on = np.any(near & (beside > _APART_CELLS), axis=1) & np.any(near & (beside < -_APART_CELLS), axis=1)
+    goes_on &= np.any(near & (np.abs(z - cells[:, 2:]) > _APART_CELLS), axis=1)
+    angle = np.arccos(np.clip(frame.cos_incidence, 0.0, 1.0))
+    mean = (nearness * (angle[index] - angle[:, None]) ** 2).sum(axis=1) / np.maximum(nearness.sum(axis=1), 1e-12)
+    return np.where(goes_on, np.maximum(0.5 * np.sqrt(mean), _LEAST_SLOPE), 0.0)
+
+
+def _neighbours(frame: LidarFrame, cells: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
+    """Return (n, count) indices of neighbours and their weights by distance; 0 is not of this object."""
     from scipy.spatial import cKDTree
 
-    cells = _cells(frame)
     found = cKDTree(cells).query(cells, k=count + 1, workers=2)
     reach, index = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
     same = (frame.object_id[index] == frame.object_id[:, None]) & (frame.tag[index] == frame.tag[:, None])
-    change = (frame.cos_incidence[index] - frame.cos_incidence[:, None]) / _COSINE_WIDTH
-    near = same & (reach < _REACH_CELLS)
-    return index, np.where(near, np.exp(-(change**2)) / (1.0 + reach**2), 0.0)
+    return index, np.where(same & (reach < _REACH_CELLS), 1.0 / (1.0 + reach**2), 0.0)
 
 
 def _fit(frame: LidarFrame, rows: slice, index: IntArray, weight: FloatArray, flatness: float) -> FloatArray:
