@@ -171,3 +171,45 @@ def test_a_tag_table_and_axes_must_be_named(folder: Path, capsys: pytest.Capture
     assert "at least one file" in capsys.readouterr().err
     assert _run(file="absent.ply") == 2
     assert "no such file" in capsys.readouterr().err
+
+
+# ---- validate
+def test_validate_says_what_the_points_suggest_for_every_word_that_lidar_needs(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    records = street()
+    (folder / "frame.ply").write_bytes(ply_text(records))
+    np.save(folder / "struct.npy", records)
+    np.save(folder / "bits.npy", records.view(np.float32).reshape(-1, 6))
+    left = records.copy()
+    left["y"] *= -1
+    np.savez(folder / "simbev.npz", data=left)
+    columns = [records[k].astype(float) for k in ("x", "y", "z", "CosAngle", "ObjIdx", "ObjTag")]
+    np.savetxt(folder / "table.csv", np.column_stack([*columns[:3], 0 * columns[0], *columns[3:]]), delimiter=",")
+    files = ["frame.bin", "frame.ply", "struct.npy", "bits.npy", "simbev.npz", "table.csv"]
+    assert main(["validate", *files, "side.yaml", "--json"]) == 0
+    *frames, side = json.loads(capsys.readouterr().out)
+    for verdict in frames:
+        assert verdict["kind"] == "semantic LiDAR", verdict
+        axes = "ros" if "simbev" in verdict["path"] else "carla"
+        for said in (f"{len(records)} points, 1 actors", "--tag-table 0.9.14", f"--frame {axes}", "64 channels"):
+            assert said in verdict["what"], verdict
+    assert side["kind"] == "side file of a LiDAR frame"
+    assert "sensor at (0.3, 0.0, 2.4)" in side["what"]
+
+
+def test_validate_refuses_what_no_table_makes_semantic_lidar(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    records = street()
+    flushed, angle = records.copy(), records.copy()
+    flushed["ObjTag"], angle["CosAngle"] = 0, 1.2
+    np.save(folder / "flushed.npy", flushed)
+    np.save(folder / "angle.npy", angle)
+    (folder / "short.bin").write_bytes(records.tobytes()[:-5])
+    (folder / "plain.ply").write_bytes(
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float32 x\nproperty float32 y\nproperty float32 z\n"
+        b"property float32 I\nend_header\n1 2 3 0.5\n"
+    )
+    assert main(["validate", "flushed.npy", "angle.npy", "short.bin", "plain.ply", "--json"]) == 2
+    problems = [v["problems"][0] for v in json.loads(capsys.readouterr().out)]
+    for problem, said in zip(problems, ("tags are 0", "CosAngle reaches 1.2", "--profile", "plain LiDAR"), strict=True):
+        assert said in problem

@@ -15,6 +15,10 @@ from .common import Json, print_json, say
 __all__ = ["Verdict", "check_file", "validate"]
 
 _YAML = (".yaml", ".yml")
+_LIDAR = (".laz", ".las")
+_TEXT = (".csv", ".txt")
+#: Fewest columns of a table of LiDAR points.
+_COLUMNS = 6
 _SCENE_KEYS = {"static", "actors", "point_targets", "radars", "ego", "lidars", "frame_period_s", "weather"}
 
 
@@ -33,10 +37,10 @@ def validate(
     all_: Annotated[
         bool, Parameter(name="--all", negative=(), help="Check everything that ships with the package.")
     ] = False,
-    profile: Annotated[str | None, Parameter(help="Radar of .npy and .bin files.")] = None,
+    profile: Annotated[str | None, Parameter(help="Radar that made .npy and .bin files of ADC samples.")] = None,
     json_: Json = False,
 ) -> int:
-    """Check YAML, mesh and ADC files and run folders.
+    """Check YAML, mesh, semantic LiDAR and ADC files and run folders.
 
     Parameters
     ----------
@@ -79,9 +83,9 @@ def check_file(path: Path, profile: str | None = None) -> Verdict:
     Parameters
     ----------
     path : path
-        YAML, mesh, ADC data, or a run folder.
+        YAML, mesh, semantic LiDAR, ADC data, or a run folder.
     profile : str, optional
-        Radar of ``.npy`` and ``.bin`` files.
+        Radar of ``.npy`` and ``.bin`` files; without one they are taken for LiDAR, unless an array is complex.
     """
     kind = "unknown"
     try:
@@ -104,6 +108,8 @@ def _checker(path: Path, profile: str | None) -> tuple[str, Callable[[Path], str
         raise NotFoundError(f"{path}: no such file or folder")
     if path.suffix in _YAML:
         return _yaml_checker(path)
+    if _is_lidar(path, profile):
+        return "semantic LiDAR", _lidar
     if path.suffix == ".npz":
         return "ADC cube", _own_cube
     if path.suffix in (".npy", ".bin"):
@@ -112,8 +118,33 @@ def _checker(path: Path, profile: str | None) -> tuple[str, Callable[[Path], str
 
     if path.suffix.lower() in MESH_SUFFIXES:
         return "mesh", _mesh
-    endings = ", ".join((*_YAML, *MESH_SUFFIXES, ".npz", ".npy", ".bin"))
+    endings = ", ".join((*_YAML, *MESH_SUFFIXES, *_LIDAR, *_TEXT, ".npz", ".npy", ".bin"))
     raise InputError(f"{path}: not a kind of file that is known here; endings: {endings}, or a run folder")
+
+
+def _is_lidar(path: Path, profile: str | None) -> bool:
+    """Tell a frame of points from a mesh and from ADC samples."""
+    import numpy as np
+
+    ending = path.suffix.lower()
+    if ending == ".ply":
+        with path.open("rb") as file:
+            head = file.read(4096).partition(b"end_header")[0]
+        return b"element face" not in head and b"element vertex" in head
+    if ending in _TEXT:
+        with path.open(encoding="utf-8", errors="replace") as text:
+            return len(text.readline().replace(",", " ").split()) >= _COLUMNS
+    if ending == ".npz":
+        from ..io.npz import load_npz
+
+        return "profile" not in load_npz(path, ())
+    if ending == ".npy" and profile is None:
+        try:
+            array = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (ValueError, OSError):
+            return False
+        return array.ndim <= 2 and not np.iscomplexobj(array)
+    return ending in _LIDAR or (ending == ".bin" and profile is None)
 
 
 def _yaml_checker(path: Path) -> tuple[str, Callable[[Path], str]]:
@@ -129,10 +160,13 @@ def _yaml_checker(path: Path) -> tuple[str, Callable[[Path], str]]:
         return "material table", _materials
     if "parts" in keys and not keys & {"actors", "radars", "static"}:
         return "tag manifest", _manifest
+    if keys & {"sensor_transform", "ego_transform"} or {"axes", "actors"} <= keys:
+        return "side file of a LiDAR frame", _side_file
     if keys & _SCENE_KEYS:
         return "scene", _scene
     raise InputError(
-        f"{path}:1: neither a profile (waveform:), a material table (materials:), a scene nor a tag manifest"
+        f"{path}:1: neither a profile (waveform:), a material table (materials:), a scene, a tag manifest nor the side "
+        "file of a LiDAR frame (axes: or sensor_transform:)"
     )
 
 
@@ -180,6 +214,28 @@ def _mesh(path: Path) -> str:
     total, hints = coverage(mesh), mesh_hints(mesh)
     text = f"{total.parts} parts, {total.triangles} triangles, {total.unlabelled_parts} parts without a tag"
     return "; ".join([text, *(f"hint: {hint}" for hint in hints)])
+
+
+def _lidar(path: Path) -> str:
+    from ..lidar.survey import survey_points
+
+    try:
+        return survey_points(path)
+    except ShenronError as error:
+        if path.suffix not in (".bin", ".npy"):
+            raise
+        raise InputError(f"{error}. If it holds ADC samples, name their radar by --profile") from None
+
+
+def _side_file(path: Path) -> str:
+    from ..lidar.side_file import read_side_file
+
+    side = read_side_file(path)
+    speed = (
+        "no ego velocity" if side.ego_velocity is None else f"ego velocity {side.ego_velocity.round(3).tolist()} m/s"
+    )
+    pose = "no sensor pose" if side.sensor_pose is None else f"sensor at {side.sensor_pose.xyz} m in the ego frame"
+    return f"{len(side.actors)} actors, {speed}, {pose}"
 
 
 def _own_cube(path: Path) -> str:

@@ -21,7 +21,7 @@ from .grid import LidarGrid, estimate_grid, surface_area
 from .readers import RawPoints, read_points
 from .side_file import SideFile, read_side_file
 
-__all__ = ["read_semantic_lidar"]
+__all__ = ["check_points", "read_semantic_lidar", "scan_frame"]
 
 _log = logging.getLogger("shenron_rt.lidar")
 
@@ -87,7 +87,7 @@ def read_semantic_lidar(
     """
     _check_choices(frame, origin)
     raw = read_points(path)
-    raw, clipped = _checked(raw, str(path))
+    raw, clipped = check_points(raw, str(path))
     side = None if side_file is None else read_side_file(side_file)
     pose = sensor_pose or (None if side is None else side.sensor_pose)
     flipped = replace(raw, xyz=from_carla_points(raw.xyz)) if frame == "carla" else raw
@@ -132,8 +132,14 @@ def _check_choices(frame: str, origin: str) -> None:
         raise InputError(f"origin {origin!r}: 'sensor', 'ego' or 'world'")
 
 
-def _checked(raw: RawPoints, path: str) -> tuple[RawPoints, int]:
-    """Return the points with cosines in [0, 1], and how many had to be changed."""
+def check_points(raw: RawPoints, path: str) -> tuple[RawPoints, int]:
+    """Return the points with cosines in [0, 1], and how many had to be changed.
+
+    Raises
+    ------
+    InputError
+        No points, NaN, all tags 0, cosines beyond rounding.
+    """
     if len(raw) == 0:
         raise InputError(f"{path}: no points (N = 0)")
     for name, values in (("position", raw.xyz), ("CosAngle", raw.cos), ("velocity", raw.range_rate)):
@@ -180,17 +186,22 @@ def _to_sensor(xyz: FloatArray, origin: str, pose: Pose | None, side: SideFile |
     return side.sensor_world.apply_inverse(xyz)
 
 
-def _frame_notes(raw: RawPoints, frame: str) -> list[str]:
-    """Compare the file's scan order with what the caller says: CARLA's sensor turns to the right."""
+def scan_frame(raw: RawPoints) -> FrameName | None:
+    """Return the axes that the file's scan order speaks for: CARLA's sensor turns to the right. None: it does not."""
     if len(raw) < 64:
-        return []
+        return None
     step = np.diff(np.unwrap(np.arctan2(raw.xyz[:, 1], raw.xyz[:, 0])))
     small = step[(np.abs(step) < np.radians(5)) & (np.abs(step) > 1e-6)]
     if len(small) < len(raw) // 2:
-        return []
+        return None
     rising = float(np.mean(small > 0))
-    guess = "carla" if rising > 0.9 else "ros" if rising < 0.1 else frame
-    if guess == frame:
+    return "carla" if rising > 0.9 else "ros" if rising < 0.1 else None
+
+
+def _frame_notes(raw: RawPoints, frame: str) -> list[str]:
+    """Compare the file's scan order with what the caller says."""
+    guess = scan_frame(raw)
+    if guess in (None, frame):
         return []
     return [
         f"frame {frame!r}, but azimuths run as if y pointed {'right' if guess == 'carla' else 'left'}: is it {guess!r}?"
