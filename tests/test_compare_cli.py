@@ -20,10 +20,15 @@ AT = (20.0, 0.0, 0.0)
 
 
 def write_run(root: Path, frame: Any, settings: dict[str, Any]) -> Path:
+    return write_runs(root, [frame], settings)
+
+
+def write_runs(root: Path, frames: list[Any], settings: dict[str, Any]) -> Path:
     with runs.write_run(root) as place:
-        runs.write_frame(runs.frame_folder(place.partial, "front", frame.frame), frame)
-        record = runs.frame_summary(frame, {7: "parked"})
-        radar = {"name": "front", "profile": frame.profile.name, "frames": [record]}
+        for frame in frames:
+            runs.write_frame(runs.frame_folder(place.partial, "front", frame.frame), frame)
+        records = [runs.frame_summary(frame, {7: "parked"}) for frame in frames]
+        radar = {"name": "front", "profile": frames[0].profile.name, "frames": records}
         runs.write_json(place.partial / "summary.json", {"version": "0", "radars": [radar]})
         (place.partial / "config.yaml").write_text(yaml.safe_dump(settings, sort_keys=False))
     return root

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, NotFoundError
-from .common import Json, Output, Overwrite, print_json, say, show_table
+from .common import Json, Output, Overwrite, frame_range, print_json, say, show_table
 
 if TYPE_CHECKING:
     from ..comparison import Comparison
@@ -30,6 +30,9 @@ def compare(
     overwrite: Overwrite = False,
     radar: str | None = None,
     frame: int | None = None,
+    frames: Annotated[
+        str | None, Parameter(help="Frames A:B of both runs, B not included. Default: all in common.")
+    ] = (None),
     lidar_origin: Annotated[
         str | None, Parameter(allow_leading_hyphen=True, help="x,y,z of the LiDAR in the radar frame [m].")
     ] = None,
@@ -45,14 +48,17 @@ def compare(
     radar
         Radar of the runs. Default: the first.
     frame
-        Frame of the runs and of a log. Default: the first.
+        One frame of the runs and of a log. Default: all that two runs have in common; the first of a log.
     """
     from .. import runs
     from ..comparison import compare as compare_sides
 
+    if frame is not None and frames is not None:
+        raise InputError("compare: --frame or --frames, not both")
     sides = [_source(path, frame) for path in (a, b)]
     origin = None if lidar_origin is None else _numbers(lidar_origin)
-    result = compare_sides(*sides, radar=radar, frame=frame, lidar_origin=origin, gate_cells=gate)
+    which = frame if frames is None else frame_range(frames)
+    result = compare_sides(*sides, radar=radar, frame=which, lidar_origin=origin, gate_cells=gate)
     default = functools.partial(runs.default_folder, f"compare-{a.stem}", b.stem)
     with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
         result.save(place.partial)
@@ -93,6 +99,8 @@ def _numbers(text: str) -> list[float]:
 
 def _show(result: Comparison) -> None:
     say(f"A = {result.name_a}\nB = {result.name_b}    differences are B minus A\n")
+    if len(result.frames) > 1:
+        say(f"{len(result.frames)} frames: powers and maps are linear means, rows and detections of all together")
     for note in result.notes:
         say(f"note: {note}")
     _table("Changed settings", ("setting", "A", "B"), [(r["key"], r["a"], r["b"]) for r in result.settings])

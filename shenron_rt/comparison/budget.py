@@ -1,32 +1,12 @@
-"""What an object's power is made of: a difference of two powers splits into causes without a rest.
+"""What an object's expected power is made of: sums over its rows, of one frame or the mean of many.
 
-For the rows i of an object, with area A, backscatter s, distance R and link L = Pt Gt Gr / losses, the power expected
-is
-    E = lambda^2 / (4 pi)^3 * sum A_i s_i L_i / R_i^4,
-
-and the power received is P; M is the mirror-like part: what the coherent echoes add up to, or, of LiDAR points, what
-geometric optics expects. In dB, from side A to side B,
-
-    10 log10(P_B / P_A) = coverage + incidence + material + surfaces + range + beam + profile + weather
-                          + mirror + speckle
-
-where each term belongs to one factor: the area; the cosines at which it is seen; what it is made of; which materials
-lie at which cosines; R^-4; the antenna pattern (all weighted means over the object's rows); the profile; the weather;
-and speckle is the rest, P / (E + M), the draw. The sum E + M splits by logarithmic means: M takes
-(M_B - M_A) / L(E_B + M_B, E_A + M_A) nepers, L(x, y) = (x - y) / ln(x / y), and each factor of E counts with weight
-L(E_B, E_A) / L(E_B + M_B, E_A + M_A), so that what changes a negligible part explains nothing. Where the echo models
-differ all of the difference is the term model. Where both are another one than ``physical`` the weight is 1 and the
-last two terms are one, rest: E is not their formula.
-Points of given RCS count with area = RCS and s = 1.
-
-References
-----------
-B. W. Ang, "The LMDI approach to decomposition analysis: a practical guide", Energy Policy 33 (2005) 867-871.
+How two of them split the difference of two powers is in :mod:`shenron_rt.comparison.terms`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,7 +24,7 @@ if TYPE_CHECKING:
     from ..config.profile import RadarProfile
     from ..returns import Returns
 
-__all__ = ["Budget", "Grouping", "budget_of", "draw_probability", "received", "terms_db"]
+__all__ = ["Budget", "Grouping", "budget_of", "draw_probability", "pool_budgets", "received"]
 
 _POINT = "(given RCS)"
 #: Two-way pattern down to which rays are cast; rows below it do not count as seen (power).
@@ -78,7 +58,7 @@ class Grouping:
 
 @dataclass(frozen=True)
 class Budget:
-    """Sums over the rows of each group, (g,) each, of one side.
+    """Sums over the rows of each group, (g,) each, of one side; of several frames ``rows`` is all, the rest a mean.
 
     Parameters
     ----------
@@ -87,10 +67,8 @@ class Budget:
         sum A; sum A s; sum A s / R^4; with the pattern of the common profile; of the own; with the weather [W].
     mirror : float
         Expected mirror-like part of rows with normals and no footprints [W].
-    looks : float
-        Independent echoes of the same power that fluctuate as ``expected + mirror`` do, (sum p)^2 / sum p^2.
-    fluctuation_db : float
-        Standard deviation that speckle gives the level of ``expected + mirror``.
+    random, squares : float
+        Sum over the rows of what fluctuates of ``expected + mirror``, and of its squares.
     mean_range, nearest, cosine : float
         Range weighted by backscatter, of the nearest row (infinite without rows) [m]; cosine weighted by area.
     shares : dict of str to (g,) float
@@ -107,16 +85,29 @@ class Budget:
     profiled: FloatArray
     expected: FloatArray
     mirror: FloatArray
-    looks: FloatArray
-    fluctuation_db: FloatArray
+    random: FloatArray
+    squares: FloatArray
     mean_range: FloatArray
     nearest: FloatArray
     cosine: FloatArray
     shares: dict[str, FloatArray]
     curves: dict[str, FloatArray]
 
+    @property
+    def looks(self) -> FloatArray:
+        """Independent echoes of the same power that fluctuate as ``expected + mirror`` do, (sum p)^2 / sum p^2."""
+        return np.maximum(_ratio(self.random**2, self.squares), 1.0)
 
-def received(returns: Returns, scatterers: Scatterers | None, grouping: Grouping) -> tuple[FloatArray, ...]:
+    @property
+    def fluctuation_db(self) -> FloatArray:
+        """Standard deviation that speckle gives the level of ``expected + mirror``."""
+        share = _ratio(self.random, self.expected + self.mirror)
+        return np.asarray(_fluctuation_db(self.looks) * share, dtype=np.float64)
+
+
+def received(
+    returns: Returns, scatterers: Scatterers | None, grouping: Grouping
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (g,) received power, that of the coherent surface echoes alone, and that of the incoherent ones [W].
 
     Coherent echoes of one object add as phasors, as in :meth:`shenron_rt.Returns.power_by_object`; objects in power.
@@ -165,21 +156,66 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     }  # fmt: skip
     sums = {name: grouping.sum(index, value) for name, value in columns.items()}
     random = np.where(given, 0.0, expected + columns["mirror"])
-    total_random = grouping.sum(index, random)
-    looks = np.maximum(_ratio(total_random**2, grouping.sum(index, random**2)), 1.0)
-    share = _ratio(total_random, sums["expected"] + sums["mirror"])
     nearest = np.full(len(grouping.keys), np.inf)
     np.minimum.at(nearest, index, s.range)
     return Budget(
         rows=np.bincount(index, minlength=len(grouping.keys)),
         **sums,
-        looks=looks,
-        fluctuation_db=_fluctuation_db(looks) * share,
+        random=grouping.sum(index, random),
+        squares=grouping.sum(index, random**2),
         mean_range=_ratio(grouping.sum(index, scattered * s.range), sums["backscatter"]),
         nearest=nearest,
         cosine=_ratio(grouping.sum(index, area * s.cos_incidence), total),
         shares=shares,
         curves=curves,
+    )
+
+
+_SUMS = ("area", "backscatter", "spread", "patterned", "profiled", "expected", "mirror", "random")
+
+
+def pool_budgets(budgets: Sequence[Budget], at: Sequence[IntArray], size: int) -> Budget:
+    """Return the mean over frames; a frame without a group counts as 0 of it.
+
+    Parameters
+    ----------
+    budgets : sequence of Budget
+        One a frame, of the same materials.
+    at : sequence of (g,) int
+        Where each one's groups are among all.
+    size : int
+        Number of all groups.
+
+    Notes
+    -----
+    Frames have speckle of their own, so the squares add: n frames of one look have n looks.
+    """
+    n = len(budgets)
+
+    def total(values: Iterable[FloatArray]) -> FloatArray:
+        out = np.zeros(size)
+        for value, place in zip(values, at, strict=True):
+            out[place] += value
+        return out
+
+    def weighted(values: Iterable[FloatArray], by: str) -> FloatArray:
+        return _ratio(total(v * getattr(b, by) for v, b in zip(values, budgets, strict=True)), n * sums[by])
+
+    sums = {name: total(getattr(b, name) for b in budgets) / n for name in _SUMS}
+    nearest = np.full(size, np.inf)
+    for budget, place in zip(budgets, at, strict=True):
+        nearest[place] = np.minimum(nearest[place], budget.nearest)
+    names = dict.fromkeys(name for b in budgets for name in b.shares)
+    none = [np.zeros(len(place)) for place in at]
+    return Budget(
+        rows=total(b.rows for b in budgets).astype(np.int64),
+        **sums,
+        squares=total(b.squares for b in budgets) / n**2,
+        mean_range=weighted((b.mean_range for b in budgets), "backscatter"),
+        nearest=nearest,
+        cosine=weighted((b.cosine for b in budgets), "area"),
+        shares={k: weighted((b.shares.get(k, z) for b, z in zip(budgets, none, strict=True)), "area") for k in names},
+        curves={k: weighted((b.curves[k] for b in budgets), "area") for k in budgets[0].curves},
     )
 
 
@@ -203,8 +239,8 @@ def _surfaces(
     assert s is not None
     names, number = material_index(side)
     sigma, areas = np.zeros(len(s)), {}
-    for name, key in keys.items():
-        here = number == names.index(name)
+    for i in np.unique(number):
+        here, key = number == i, keys[names[i]]
         sigma[here] = np.interp(s.cos_incidence[here], COSINES, palette.curves[key])
         areas[key] = grouping.sum(index, np.where(here, area, 0.0))
     return sigma, areas
@@ -232,89 +268,3 @@ def draw_probability(budget: Budget, incoherent: FloatArray) -> FloatArray:
     ratio = _ratio(incoherent, mean)
     below = gammainc(budget.looks, budget.looks * ratio)
     return np.where((mean > 0) & (incoherent > 0), 2 * np.minimum(below, 1 - below), 1.0)
-
-
-_NEPER_DB = 10 / math.log(10)
-_DIFFUSE = ("coverage", "incidence", "material", "surfaces", "range", "beam", "profile", "weather")
-
-
-def terms_db(
-    a: tuple[Budget, float, float], b: tuple[Budget, float, float], group: int, *, models: tuple[str, str]
-) -> dict[str, float] | None:
-    """Return the terms of one group, B over A; they add up to the difference of its levels.
-
-    Parameters
-    ----------
-    a, b : (Budget, received power [W], coherent power [W])
-    group : int
-    models : (str, str)
-        Echo models of the sides.
-
-    Returns
-    -------
-    dict of str to float or None
-        None where a side has nothing.
-    """
-    (x, p_a, c_a), (y, p_b, c_b) = a, b
-    factors = ("area", "backscatter", "spread", "patterned", "profiled", "expected")
-    values = [[float(getattr(budget, f)[group]) for f in factors] for budget in (x, y)]
-    e_a, e_b = values[0][-1], values[1][-1]
-    m_a, m_b = c_a + float(x.mirror[group]), c_b + float(y.mirror[group])
-    if min(e_a + m_a, e_b + m_b, p_a, p_b) <= 0:
-        return None
-    if models[0] != models[1]:
-        return {"model": _db(p_b / p_a)}
-    physical = models[0] == "physical"
-    terms = dict.fromkeys(_DIFFUSE, 0.0)
-    whole = _log_mean(e_b + m_b, e_a + m_a)
-    if min(e_a, e_b) > 0:
-        weight = _log_mean(e_b, e_a) / whole if physical else 1.0
-        terms = {name: value * weight for name, value in _diffuse_terms(x, y, values, group).items()}
-    elif physical:  # metal has no diffuse part: on one side, or on both
-        terms["coverage"] = _NEPER_DB * (e_b - e_a) / whole
-    if not physical:
-        return terms | {"rest": _db(p_b / p_a) - sum(terms.values())}
-    terms["mirror"] = _NEPER_DB * (m_b - m_a) / whole
-    terms["speckle"] = _db(p_b / (e_b + m_b)) - _db(p_a / (e_a + m_a))
-    return terms
-
-
-def _diffuse_terms(x: Budget, y: Budget, values: list[list[float]], group: int) -> dict[str, float]:
-    """Return how the expected diffuse powers differ, factor by factor [dB]."""
-    steps = [[_db(v[i + 1] / v[i]) for i in range(5)] for v in values]
-    d_sigma, d_range, d_beam, d_profile, d_weather = (q - p for p, q in zip(*steps, strict=True))
-    incidence, material = _incidence_and_material(x, y, group)
-    return {
-        "coverage": _db(values[1][0] / values[0][0]),
-        "incidence": incidence,
-        "material": material,
-        "surfaces": d_sigma - incidence - material,
-        "range": d_range,
-        "beam": d_beam,
-        "profile": d_profile,
-        "weather": d_weather,
-    }
-
-
-def _log_mean(x: float, y: float) -> float:
-    """Return (x - y) / ln(x / y), the logarithmic mean of two positive numbers; x where they are equal."""
-    difference = (x - y) / y
-    # the quotient loses its digits where x is near y; there its series has them
-    return y * (1 + difference / 2) if abs(difference) < 1e-6 else (x - y) / math.log(x / y)
-
-
-def _incidence_and_material(a: Budget, b: Budget, group: int) -> tuple[float, float]:
-    """Return what the cosines alone and the materials alone change, each the mean over the two orders of changing."""
-
-    def mean(view: Budget, made: Budget) -> float:
-        """Mean sigma0 of what ``made`` consists of, at the cosines of ``view``."""
-        return sum(float(share[group] * view.curves[name][group]) for name, share in made.shares.items())
-
-    aa, ab, ba, bb = mean(a, a), mean(a, b), mean(b, a), mean(b, b)
-    if min(aa, ab, ba, bb) <= 0:
-        return 0.0, 0.0
-    return (_db(ba / aa) + _db(bb / ab)) / 2, (_db(ab / aa) + _db(bb / ba)) / 2
-
-
-def _db(ratio: float) -> float:
-    return 10 * math.log10(ratio)

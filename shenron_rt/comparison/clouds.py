@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .._typing import FloatArray, IntArray
@@ -9,7 +11,7 @@ from ..scatterers import Scatterers
 from ..tags import SemanticTag
 from .record import Record
 
-__all__ = ["compare_clouds"]
+__all__ = ["compare_clouds", "pool_clouds"]
 
 _QUANTILES = (0.1, 0.5, 0.9)
 
@@ -32,24 +34,56 @@ def compare_clouds(a: Scatterers, b: Scatterers, voxel_m: float) -> Record:
         quantiles over the rows.
     """
     cells_a, cells_b = (_cells(s.position, voxel_m) for s in (a, b))
-    both = len(np.intersect1d(cells_a, cells_b, assume_unique=True))
-    either = len(cells_a) + len(cells_b) - both
-    share = (lambda n: n / either) if either else (lambda n: 0.0)
     return Record(
-        occupancy=Record(
-            voxel_m=voxel_m,
-            cells_a=len(cells_a),
-            cells_b=len(cells_b),
-            cells_both=both,
-            share_both=share(both),
-            share_a_only=share(len(cells_a) - both),
-            share_b_only=share(len(cells_b) - both),
+        occupancy=_occupancy(
+            voxel_m, len(cells_a), len(cells_b), len(np.intersect1d(cells_a, cells_b, assume_unique=True))
         ),
         tags=_by_tag(a, b),
         cosine=Record(a=_quantiles(a.cos_incidence), b=_quantiles(b.cos_incidence)),
         rows_a=len(a),
         rows_b=len(b),
     )
+
+
+def pool_clouds(frames: Sequence[Record]) -> Record:
+    """Return cells and rows of all frames together, areas and quantiles as means over the frames."""
+    if len(frames) == 1:
+        return frames[0]
+    cells = [f.occupancy for f in frames]
+    counts = (sum(c[k] for c in cells) for k in ("cells_a", "cells_b", "cells_both"))
+    names = dict.fromkeys(t.tag for f in frames for t in f.tags)
+    return Record(
+        occupancy=_occupancy(cells[0].voxel_m, *counts),
+        tags=[_pool_tag([t for f in frames for t in f.tags if t.tag == name], len(frames)) for name in names],
+        cosine=Record({side: _pool_quantiles([f.cosine[side] for f in frames]) for side in "ab"}),
+        rows_a=sum(f.rows_a for f in frames),
+        rows_b=sum(f.rows_b for f in frames),
+    )
+
+
+def _pool_tag(records: Sequence[Record], frames: int) -> Record:
+    pooled = Record(tag=records[0].tag)
+    for side in "ab":
+        rows = [r[f"rows_{side}"] for r in records]
+        areas = [r[f"area_m2_{side}"] for r in records]
+        cosines = [r[f"mean_cosine_{side}"] or 0.0 for r in records]
+        pooled[f"rows_{side}"] = sum(rows)
+        pooled[f"area_m2_{side}"] = None if None in areas else sum(areas) / frames
+        pooled[f"mean_cosine_{side}"] = float(np.dot(rows, cosines) / sum(rows)) if sum(rows) else None
+    return pooled
+
+
+def _pool_quantiles(quantiles: Sequence[Record | None]) -> Record | None:
+    known = [q for q in quantiles if q is not None]
+    return Record({k: float(np.mean([q[k] for q in known])) for k in known[0]}) if known else None
+
+
+def _occupancy(voxel_m: float, a: int, b: int, both: int) -> Record:
+    either = max(a + b - both, 1)
+    return Record(
+        voxel_m=voxel_m, cells_a=a, cells_b=b, cells_both=both,
+        share_both=both / either, share_a_only=(a - both) / either, share_b_only=(b - both) / either,
+    )  # fmt: skip
 
 
 def _cells(position: FloatArray, size: float) -> IntArray:

@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .._typing import ArrayLike
 from ..errors import InputError
-from .clouds import compare_clouds
-from .maps import MapPair, compare_maps, map_record
-from .objects import compare_objects, compare_tags
-from .points import Gate, match_detections
+from .clouds import pool_clouds
+from .frame_pair import FramePair, common_frames, palette_of, same_axes
+from .levels import Levels
+from .maps import MapPair, map_record, pool_maps
+from .objects import object_records, tag_records
+from .points import Gate, pool_matches
 from .record import Record
-from .settings import changed_settings, results
-from .sides import Side, side_of
-
-if TYPE_CHECKING:
-    from ..config.profile import RadarProfile
+from .settings import changed_settings, pool_results
+from .sides import Side, opened, side_of
 
 __all__ = ["Comparison", "compare"]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Where two sides agree and differ; differences are B minus A.
+    """Where two sides agree and differ; differences are B minus A. Over several frames powers are linear means.
 
     Parameters
     ----------
     name_a, name_b : str
+    frames : list of int
+        The frames compared, of A where the sides number them differently.
     objects : list of Record
         One an object: ``id, name, tag, power_db_a, power_db_b`` [dBW], ``delta_db, seen_by`` ("both", "a", "b"),
         ``cause``, its ``meaning``, further causes in ``also``, and the numbers behind it: ``terms_db`` (what the
@@ -49,10 +51,16 @@ class Comparison:
         Figures of each side, ``a`` and ``b``.
     notes : list of str
         What could not be compared, and why.
+    sides : (Side, Side)
+        Of the first frame, with all that was compared.
+    later_sides : list of (Side, Side)
+        Of the others, their detections alone.
+    map_pairs : list of MapPair
     """
 
     name_a: str
     name_b: str
+    frames: list[int]
     objects: list[Record]
     tags: list[Record]
     maps: dict[str, Record]
@@ -62,18 +70,20 @@ class Comparison:
     results: Record
     notes: list[str]
     sides: tuple[Side, Side] = field(repr=False)
+    later_sides: list[tuple[Side, Side]] = field(repr=False)
     map_pairs: list[MapPair] = field(repr=False)
 
     def __repr__(self) -> str:
         found = self.detections
+        frames = f"{len(self.frames)} frames, " if len(self.frames) > 1 else ""
         return (
-            f"Comparison({self.name_a!r} with {self.name_b!r}: {len(self.objects)} objects, {len(found.matched)} "
-            f"detections matched, {len(found.missed)} missed, {len(found.extra)} extra)"
+            f"Comparison({self.name_a!r} with {self.name_b!r}: {frames}{len(self.objects)} objects, "
+            f"{len(found.matched)} detections matched, {len(found.missed)} missed, {len(found.extra)} extra)"
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the arrays, ready for JSON."""
-        names = ("objects", "tags", "maps", "scatterers", "detections", "settings", "results", "notes")
+        names = ("frames", "objects", "tags", "maps", "scatterers", "detections", "settings", "results", "notes")
         return {"a": self.name_a, "b": self.name_b} | {name: getattr(self, name) for name in names}
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
@@ -92,12 +102,12 @@ def compare(
     b: Any,
     *,
     radar: str | None = None,
-    frame: int | None = None,
+    frame: int | Sequence[int] | None = None,
     lidar_origin: ArrayLike | None = None,
     gate_cells: float = 2.0,
     voxel_m: float = 0.5,
 ) -> Comparison:
-    """Compare two frames of one radar: mesh with LiDAR, any two runs, or a run with a recorded point cloud.
+    """Compare two sides of one radar: mesh with LiDAR, any two runs, or a run with a recorded point cloud.
 
     Parameters
     ----------
@@ -105,8 +115,9 @@ def compare(
         A recorded cloud on one side only.
     radar : str, optional
         Radar of a run folder; default its first.
-    frame : int, optional
-        Frame of a run folder; default its first.
+    frame : int or sequence of int, optional
+        Frame of the run folders, or several of both. Default: all that two runs have in common; beside a Frame or a
+        recorded cloud a run's first.
     lidar_origin : (3,) array_like, optional
         Where the LiDAR stood, in the radar frame [m]; without it "hidden from the LiDAR" cannot be proven.
     gate_cells : float
@@ -134,29 +145,47 @@ def compare(
     """
     if gate_cells <= 0 or voxel_m <= 0:
         raise InputError(f"gate_cells and voxel_m must be positive, got {gate_cells:g} and {voxel_m:g}")
-    left, right = (
-        side_of(source, label, radar=radar, frame=frame, lidar_origin=lidar_origin)
-        for source, label in ((a, "A"), (b, "B"))
+    a, b = opened(a), opened(b)
+    numbers, left_out = common_frames(a, b, radar, frame)
+    pairs: list[FramePair] = []
+    palette = gate = None
+    for number in numbers:
+        left, right = (
+            side_of(source, label, radar=radar, frame=number, lidar_origin=lidar_origin)
+            for source, label in ((a, "A"), (b, "B"))
+        )
+        if left.profile is None and right.profile is None:
+            raise InputError("compare: two recorded clouds have no profile whose cells could match them; give one run")
+        gate = gate or _gate(left, right, gate_cells)
+        palette = palette or palette_of(left, right, several=len(numbers) > 1)
+        pair = FramePair.of(left, right, palette, gate, voxel_m)
+        pairs.append(pair.light() if pairs else pair)
+    return _pooled(pairs, left_out)
+
+
+def _pooled(pairs: Sequence[FramePair], left_out: list[str]) -> Comparison:
+    left, right = pairs[0].a, pairs[0].b
+    names = {key: name for pair in reversed(pairs) for key, name in pair.names.items()}
+    by_object, by_tag = (
+        [level for pair in pairs if (level := getattr(pair, kind)) is not None] for kind in ("objects", "tags")
     )
-    profile = left.profile or right.profile
-    if profile is None:
-        raise InputError("compare: two recorded clouds have no profile whose cells could match them; give one run")
-    notes = _notes(left, right)
-    pairs = compare_maps(left.cube, right.cube) if left.cube and right.cube and _same_axes(left, right) else []
-    both = left.scatterers is not None and right.scatterers is not None
+    maps = pool_maps([pair.maps for pair in pairs])
+    clouds = [pair.cloud for pair in pairs if pair.cloud is not None]
     return Comparison(
         name_a=left.name,
         name_b=right.name,
-        objects=compare_objects(left, right),
-        tags=compare_tags(left, right),
-        maps={pair.name: map_record(pair) for pair in pairs},
-        scatterers=compare_clouds(left.scatterers, right.scatterers, voxel_m) if both else None,  # type: ignore[arg-type]
-        detections=match_detections(left.detections, right.detections, _gate(left, right, gate_cells)),
+        frames=[pair.a.frame for pair in pairs],
+        objects=object_records(Levels.pool(by_object), left, right, names) if by_object else [],
+        tags=tag_records(Levels.pool(by_tag), left, right) if by_tag else [],
+        maps={pair.name: map_record(pair) for pair in maps},
+        scatterers=pool_clouds(clouds) if clouds else None,
+        detections=pool_matches([(pair.a.frame, pair.found) for pair in pairs]),
         settings=changed_settings(left, right),
-        results=Record(a=results(left), b=results(right)),
-        notes=notes,
+        results=Record({side: pool_results([pair.results[k] for pair in pairs]) for k, side in enumerate("ab")}),
+        notes=[*_notes(left, right), *left_out],
         sides=(left, right),
-        map_pairs=pairs,
+        later_sides=[(pair.a, pair.b) for pair in pairs[1:]],
+        map_pairs=maps,
     )
 
 
@@ -173,17 +202,6 @@ def _gate(a: Side, b: Side, cells: float) -> Gate:
     )
 
 
-def _same_axes(a: Side, b: Side) -> bool:
-    if a.cube is None or b.cube is None:
-        return False
-    return a.cube.n_fft == b.cube.n_fft and _cells(a.cube.profile) == _cells(b.cube.profile)
-
-
-def _cells(profile: RadarProfile) -> tuple[Any, ...]:
-    """Return what the axes of the maps derive from."""
-    return (profile.waveform, profile.array)
-
-
 def _notes(a: Side, b: Side) -> list[str]:
     notes = []
     for side, label in ((a, "A"), (b, "B")):
@@ -193,7 +211,7 @@ def _notes(a: Side, b: Side) -> list[str]:
             notes.append(f"{label} ({side.name}) has no echoes (a processed capture): no objects on that side")
         if side.viewer == "lidar" and side.origin is None:
             notes.append(f"{label}: the LiDAR's origin is not known; give lidar_origin to prove what is hidden from it")
-    if a.cube is not None and b.cube is not None and not _same_axes(a, b):
+    if a.cube is not None and b.cube is not None and not same_axes(a, b):
         names = f"{a.cube.profile.name!r} and {b.cube.profile.name!r}"
         notes.append(f"maps skipped: the waveforms or arrays of {names} differ, so their cells are not the same")
     windows = [(s.cube.range_window, s.cube.doppler_window) for s in (a, b) if s.cube is not None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from .._typing import FloatArray
 from ..dsp import RadarCube
 from .record import Record
 
-__all__ = ["MapPair", "compare_maps", "map_record"]
+__all__ = ["MapPair", "compare_maps", "map_record", "pool_maps"]
 
 _MAPS = ("range_doppler", "range_azimuth")
 #: Above the noise, a cell holds an echo: 13 dB, exceeded by noise in one cell of 5e8 (exponential power).
@@ -43,6 +44,21 @@ def compare_maps(a: RadarCube, b: RadarCube) -> list[MapPair]:
     floors = {"range_doppler": 1.0, "range_azimuth": largest / len(a.azimuth_channels)}
     level = max(a.noise_power_w, b.noise_power_w)
     return [MapPair(name, getattr(a, name), getattr(b, name), level * floors[name]) for name in _MAPS]
+
+
+def pool_maps(frames: Sequence[Sequence[MapPair]]) -> list[MapPair]:
+    """Return the mean power over frames of each kind of map; nothing where a frame has none."""
+    if not all(frames):
+        return []
+    return [
+        MapPair(
+            pairs[0].name,
+            np.mean([p.a for p in pairs], axis=0),
+            np.mean([p.b for p in pairs], axis=0),
+            max(p.floor for p in pairs),
+        )
+        for pairs in zip(*frames, strict=True)
+    ]
 
 
 def map_record(pair: MapPair) -> Record:

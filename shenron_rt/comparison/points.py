@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from .record import Record
 if TYPE_CHECKING:
     from ..config.profile import RadarProfile
 
-__all__ = ["Gate", "match_detections"]
+__all__ = ["Gate", "match_detections", "pool_matches"]
 
 #: Cost of a pair outside the gate; any set of pairs inside is cheaper than one of these.
 _FORBIDDEN = 1e6
@@ -100,6 +101,26 @@ def match_detections(a: Detections | PointCloud, b: Detections | PointCloud, gat
         errors=Record({name: _statistics(value) for name, value in errors.items()}),
         gate=Record(range_m=gate.range_m, velocity_mps=gate.velocity_mps, azimuth_sine=gate.sine),
     )
+
+
+def pool_matches(frames: Sequence[tuple[int, Record]]) -> Record:
+    """Return the matches of all frames together, each record with its ``frame``; detections match within a frame.
+
+    Parameters
+    ----------
+    frames : sequence of (int, Record)
+        Frame and what :func:`match_detections` returned.
+    """
+    lists = {
+        kind: [Record(r, frame=number) for number, found in frames for r in found[kind]]
+        for kind in ("matched", "missed", "extra")
+    }
+    first = frames[0][1]
+    errors = {
+        name: _statistics(np.array([m[f"{name}_error"] for m in lists["matched"]], dtype=np.float64))
+        for name in first.errors
+    }
+    return Record(**lists, errors=Record(errors), gate=first.gate)
 
 
 def _differences(

@@ -10,7 +10,7 @@ import numpy as np
 from .record import Record
 from .sides import Side
 
-__all__ = ["changed_settings", "results"]
+__all__ = ["changed_settings", "pool_results", "results"]
 
 
 def changed_settings(a: Side, b: Side) -> list[Record]:
@@ -94,3 +94,16 @@ def results(side: Side) -> Record:
         strongest_velocity_mps=None if strongest is None else float(found.velocity[strongest]),
         strongest_snr_db=None if strongest is None else float(found.snr_db[strongest]),
     )
+
+
+def pool_results(frames: Sequence[Record]) -> Record:
+    """Return counts of all frames, mean received power, and the strongest detection of any."""
+    best = max(frames, key=lambda r: -np.inf if r["strongest_snr_db"] is None else r["strongest_snr_db"])
+    pooled = Record(best)
+    for name in ("scatterers", "returns", "detections"):
+        counts = [r[name] for r in frames if r[name] is not None]
+        pooled[name] = sum(counts) if counts else None
+    if any(r["received_dbw"] is not None for r in frames):
+        watts = [0.0 if r["received_dbw"] is None else 10 ** (r["received_dbw"] / 10) for r in frames]
+        pooled["received_dbw"] = float(10 * np.log10(np.mean(watts)))
+    return pooled

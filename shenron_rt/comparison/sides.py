@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..config.materials import MaterialTable
     from ..config.profile import RadarProfile
 
-__all__ = ["Side", "side_of"]
+__all__ = ["Side", "frames_of", "opened", "side_of"]
 
 _log = logging.getLogger(__name__)
 
@@ -77,15 +77,35 @@ def side_of(source: Any, label: str, *, radar: str | None, frame: int | None, li
     InputError
         Something else; no such radar or frame in the run.
     """
+    source = opened(source)
     if isinstance(source, PointCloud):
         return Side(name=source.source or label, detections=source, frame=source.frame)
-    if isinstance(source, str | os.PathLike):
-        source = load_run(source)
     if isinstance(source, Run):
         return _of_run(source, radar, frame, lidar_origin)
     if hasattr(source, "cube") and hasattr(source, "detections"):
         return _of_frame(source, label, lidar_origin)
     raise InputError(f"compare: {label} must be a Frame, a run folder or a PointCloud, got {type(source).__name__}")
+
+
+def opened(source: Any) -> Any:
+    """Return the run of a folder's path; anything else as it is."""
+    return load_run(source) if isinstance(source, str | os.PathLike) else source
+
+
+def frames_of(source: Any, radar: str | None) -> list[int] | None:
+    """Return the frames of a run's radar; None for what is one frame."""
+    return sorted(_numbered(source, radar)[1]) if isinstance(source, Run) else None
+
+
+def _numbered(run: Run, radar: str | None) -> tuple[str, dict[int, Path]]:
+    """Return the radar's name and its frames' folders by number."""
+    name = radar or next(iter(run.frames), None)
+    if name is None or name not in run.frames:
+        raise InputError(f"{run.root}: no radar {name!r} in this run; it has {', '.join(run.radars) or 'none'}")
+    numbered = {int(folder.name.removeprefix("frame_")): folder for folder in run.frames[name]}
+    if not numbered:
+        raise InputError(f"{run.root}: radar {name!r} has no frames")
+    return name, numbered
 
 
 def _origin(scatterers: Scatterers | None, lidar_origin: ArrayLike | None) -> FloatArray | None:
@@ -120,12 +140,7 @@ def _of_frame(frame: Any, label: str, lidar_origin: ArrayLike | None) -> Side:
 
 
 def _of_run(run: Run, radar: str | None, frame: int | None, lidar_origin: ArrayLike | None) -> Side:
-    name = radar or next(iter(run.frames), None)
-    if name is None or name not in run.frames:
-        raise InputError(f"{run.root}: no radar {name!r} in this run; it has {', '.join(run.radars) or 'none'}")
-    numbered = {int(folder.name.removeprefix("frame_")): folder for folder in run.frames[name]}
-    if not numbered:
-        raise InputError(f"{run.root}: radar {name!r} has no frames")
+    name, numbered = _numbered(run, radar)
     index = min(numbered) if frame is None else frame
     if index not in numbered:
         raise InputError(f"{run.root}: radar {name!r} has no frame {index}; it has {sorted(numbered)}")

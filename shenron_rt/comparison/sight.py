@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from .._typing import FloatArray, IntArray
 from .record import Record
 
-__all__ = ["Sight"]
+__all__ = ["Sight", "pool_sights"]
 
 #: Rays around a line of sight that have a say.
 _NEIGHBOURS = 4
@@ -18,6 +19,8 @@ _REACH = 1.5
 #: Two surfaces closer than this along a ray are one [m], [share of the range].
 _SAME_M, _SAME_SHARE = 0.3, 0.02
 _MIN_SPREAD_RAD = 1e-4
+#: So many of what hides an object are named.
+_OCCLUDERS = 3
 
 
 class Sight:
@@ -62,11 +65,11 @@ class Sight:
         Record
             Shares of the points, which add up to 1: ``seen``, ``behind_itself``, ``behind_other``, ``other_label`` (a
             surface of another label in the same place), ``through`` (the ray went on behind the point), ``no_ray``; and
-            ``occluders``, name -> share.
+            ``occluders``, name -> share; ``points``, how many were looked at.
         """
         shares = dict.fromkeys(("seen", "behind_itself", "behind_other", "other_label", "through", "no_ray"), 0.0)
         if self._tree is None or not len(position):
-            return Record(shares, no_ray=1.0, occluders=Record())
+            return Record(shares, no_ray=1.0, occluders=Record(), points=len(position))
         arm = position - self._origin
         reach = np.linalg.norm(arm, axis=1)
         k = min(_NEIGHBOURS, len(self._range))
@@ -85,10 +88,22 @@ class Sight:
         for name, mask in kinds.items():
             shares[name] = float(np.sum(weight[mask]))
         shares["no_ray"] = float(np.mean(~near.any(axis=1)))
-        return Record(shares, occluders=self._occluders(ray, weight, kinds["behind_other"], names))
+        hiding = self._occluders(ray, weight, kinds["behind_other"], names)
+        return Record(shares, occluders=hiding, points=len(position))
 
     def _occluders(self, ray: IntArray, weight: FloatArray, mask: IntArray, names: Mapping[int, str]) -> Record:
         ids, row = np.unique(self._label[ray[mask]], return_inverse=True)
         share = np.bincount(row, weight[mask], len(ids)) if len(ids) else np.zeros(0)
-        order = np.argsort(-share)[:3]
+        order = np.argsort(-share)[:_OCCLUDERS]
         return Record({names.get(int(ids[i]), f"object {ids[i]}"): float(share[i]) for i in order if share[i] > 0})
+
+
+def pool_sights(sights: Sequence[Record]) -> Record:
+    """Return the shares over all points of several frames."""
+    total = max(sum(s["points"] for s in sights), 1)
+    shares = [k for k in sights[0] if k not in ("occluders", "points")]
+    pooled = {k: sum(s[k] * s["points"] for s in sights) / total for k in shares}
+    hiding: Counter[str] = Counter()
+    for sight in sights:
+        hiding.update({name: share * sight["points"] / total for name, share in sight["occluders"].items()})
+    return Record(pooled, occluders=Record(hiding.most_common(_OCCLUDERS)), points=sum(s["points"] for s in sights))

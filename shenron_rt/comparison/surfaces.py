@@ -11,7 +11,7 @@ from .._typing import FloatArray, IntArray
 from ..echo.glint import points_sigma0
 from .sides import Side
 
-__all__ = ["COSINES", "Palette", "material_index", "mirror_sigma0"]
+__all__ = ["COSINES", "Palette", "material_index", "mirror_sigma0", "used_materials"]
 
 #: Cosines over which sigma0 is tabulated.
 COSINES = np.linspace(0.0, 1.0, 1025)
@@ -34,12 +34,20 @@ class Palette:
     of_b: dict[str, str]
 
     @classmethod
-    def of(cls, a: Side, b: Side) -> Palette:
-        """Return the materials that lie on either side's rows; one name with two meanings gets two keys."""
-        curves_a = {name: _sigma0_grid(a, name) for name in _used(a)}
+    def of(cls, a: Side, b: Side, used: tuple[set[str], set[str]] | None = None) -> Palette:
+        """Return the materials that lie on either side's rows; one name with two meanings gets two keys.
+
+        Parameters
+        ----------
+        a, b : Side
+        used : (set of str, set of str), optional
+            Names of the materials of either side, where those of further frames count too.
+        """
+        names = used or (used_materials(a), used_materials(b))
+        curves_a = {name: _sigma0_grid(a, name) for name in sorted(names[0])}
         curves = dict(curves_a)
         of_b = {}
-        for name in _used(b):
+        for name in sorted(names[1]):
             grid = _sigma0_grid(b, name)
             same = name not in curves_a or np.array_equal(curves_a[name], grid)
             of_b[name] = name if same else f"{name} (B)"
@@ -72,9 +80,10 @@ def _in_weather(side: Side, name: str) -> str:
     return side.materials.in_weather(name, 0.0 if weather is None else weather.rain_mm_h)
 
 
-def _used(side: Side) -> list[str]:
+def used_materials(side: Side) -> set[str]:
+    """Return the names of the materials that lie on a side's rows."""
     names, number = material_index(side)
-    return [names[i] for i in np.unique(number)]
+    return {names[i] for i in np.unique(number)}
 
 
 def _sigma0_grid(side: Side, name: str) -> FloatArray:

@@ -26,6 +26,7 @@ _SPAN_DIFFERENCE = 20.0
 _MAX_OBJECTS = 12
 _MAX_NAME = 22
 _WIDTH = 15.0
+_MAP_NAMES = {"range_doppler": "range-Doppler", "range_azimuth": "range-azimuth"}
 
 
 def comparison_page(comparison: Comparison, path: Path) -> Path:
@@ -45,7 +46,7 @@ def comparison_page(comparison: Comparison, path: Path) -> Path:
     figure, first = new_figure(_WIDTH, height)
     first.remove()
     grid = figure.add_gridspec(
-        rows, 3, left=0.10, right=0.97, bottom=0.6 / height + 0.02, top=1 - 1.1 / height, hspace=0.34, wspace=0.26
+        rows, 3, left=0.10, right=0.94, bottom=0.6 / height + 0.02, top=1 - 1.1 / height, hspace=0.34, wspace=0.26
     )
     for row, pair in enumerate(comparison.map_pairs):
         _maps(figure, [figure.add_subplot(grid[row, k]) for k in range(3)], comparison, pair)
@@ -57,7 +58,8 @@ def comparison_page(comparison: Comparison, path: Path) -> Path:
     )
     title = "      ".join([*names, "differences are B minus A"])
     figure.text(0.10, 1 - 0.35 / height, title, fontsize=13, weight="bold", va="center")
-    notes = "; ".join(comparison.notes) or "same radar, same axes"
+    several = [f"mean of {len(comparison.frames)} frames"] if len(comparison.frames) > 1 else []
+    notes = "; ".join([*several, *comparison.notes]) or "same radar, same axes"
     figure.text(0.10, 1 - 0.65 / height, textwrap.shorten(notes, 200), fontsize=9, va="center", color="#555b66")
     return save(figure, path)
 
@@ -77,7 +79,7 @@ def _maps(figure: Figure, axes: list[Axes], comparison: Comparison, pair: Any) -
     record = comparison.maps[pair.name]
     for ax, level, name in ((axes[0], level_a, "A"), (axes[1], level_b, "B")):
         image = ax.imshow(level, cmap=CMAP, vmin=low, vmax=high, **shared)
-        ax.set_title(f"{name}: {pair.name.replace('_', '-')}", fontsize=10, loc="left")
+        ax.set_title(f"{name}: {_MAP_NAMES[pair.name]}", fontsize=10, loc="left")
     _bar(figure, image, axes[1], "dBm")
     floor = float(dbm(pair.floor))
     difference = np.maximum(level_b, floor) - np.maximum(level_a, floor)
@@ -88,8 +90,7 @@ def _maps(figure: Figure, axes: list[Axes], comparison: Comparison, pair: Any) -
     axes[2].set_title(f"{text}, LSD {record['log_spectral_distance_db']:.1f} dB", fontsize=10, loc="left")
     _points(axes, comparison, doppler)
     for ax in axes:
-        if not doppler:
-            ax.invert_xaxis()  # left on the left
+        ax.set_xlim(extent[:2] if doppler else extent[1::-1])  # left on the left; no strip for a mark on the edge
         ax.set_xlabel(label, fontsize=9)
         ax.tick_params(labelsize=8)
         ax.set_ylim(0, extent[3])
@@ -98,10 +99,11 @@ def _maps(figure: Figure, axes: list[Axes], comparison: Comparison, pair: Any) -
 
 def _points(axes: list[Axes], comparison: Comparison, doppler: bool) -> None:
     """Ring the detections of each side; on the difference, those that the other side misses."""
-    for ax, side in zip(axes, comparison.sides, strict=False):
-        found = side.detections
-        x = found.velocity if doppler else np.sin(found.azimuth)
-        ax.plot(x, found.range, ls="none", marker="o", ms=6, mfc="none", mec=DETECTION, mew=0.9)
+    for sides in (comparison.sides, *comparison.later_sides):
+        for ax, side in zip(axes, sides, strict=False):
+            found = side.detections
+            x = found.velocity if doppler else np.sin(found.azimuth)
+            ax.plot(x, found.range, ls="none", marker="o", ms=6, mfc="none", mec=DETECTION, mew=0.9)
     key = "velocity_mps" if doppler else "azimuth_deg"
     for records, colour, label in (
         (comparison.detections["missed"], THRESHOLD, "A only"), (comparison.detections["extra"], TRACE, "B only")
@@ -156,7 +158,7 @@ def _errors(figure: Figure, grid: Any, comparison: Comparison) -> None:
     names = (
         ("range_m_error", "range [m]"),
         ("velocity_mps_error", "velocity [m/s]"),
-        ("azimuth_deg_error", "az [deg]"),
+        ("azimuth_deg_error", "azimuth [deg]"),
     )
     for row, (key, label) in enumerate(names):
         ax = figure.add_subplot(grid[row, 0])
