@@ -173,6 +173,19 @@ def test_a_tag_table_and_axes_must_be_named(folder: Path, capsys: pytest.Capture
     assert "no such file" in capsys.readouterr().err
 
 
+def test_points_hidden_from_the_radar_are_left_out_on_request(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    more = ("--side-file", "side.yaml", "--mount", "2,-3,0.5", "--no-pictures", "--json")
+    assert _run(*more, "-o", "all") == 0
+    every = json.loads(capsys.readouterr().out)["lidar"][0]
+    assert _run(*more, "--hide-occluded", "-o", "seen") == 0
+    seen = json.loads(capsys.readouterr().out)["lidar"][0]
+    assert seen["points"] < every["points"] == every["points_read"] == seen["points_read"]
+    # the car is a box straight ahead: the radar, below its roof, sees neither that nor the road and the wall behind
+    assert seen["tags"]["Buildings"] < every["tags"]["Buildings"]
+    left_out = every["points"] - seen["points"]
+    assert any(f"nearer points: {left_out} points left out" in note for note in seen["notes"])
+
+
 # ---- validate
 def test_validate_says_what_the_points_suggest_for_every_word_that_lidar_needs(
     folder: Path, capsys: pytest.CaptureFixture[str]

@@ -11,12 +11,14 @@ import pytest
 from lidar_tools import CAR_ID, HEIGHT_M, WALL_X, street, write_bin
 
 import shenron_rt as srt
+from shenron_rt.config.scene import LidarMount
 from shenron_rt.echo.glint import GLINT_SLOPE, cone_sigma0, glint_sigma0
 from shenron_rt.errors import InputError
 from shenron_rt.lidar import lidar_scatterers
 from shenron_rt.lidar.door import door_counts
 from shenron_rt.lidar.grid import LidarGrid
 from shenron_rt.lidar.normals import estimate_normals
+from shenron_rt.lidar.occlusion import hidden_from_radar
 
 ROOF = srt.Pose((0.3, 0.0, HEIGHT_M))
 BUMPER = srt.Pose((2.0, 0.0, 1.0))
@@ -134,6 +136,42 @@ def test_surfaces_that_face_away_from_the_radar_are_dark_and_counted(frame: srt.
     assert roof.any()
     assert np.median(low.cos_incidence[roof]) == 0
     assert door_counts(frame, low)["facing_away_from_the_radar"] >= int(0.5 * roof.sum())
+
+
+# ---- hidden from the radar
+def _street_with_a_walker_behind_a_car() -> srt.Scene:
+    return srt.Scene(
+        static=[{"id": 1, "shape": "ground:80x30", "xyz_m": (42, 0, 0), "tag": "Roads", "material": "asphalt"}],
+        actors=[
+            {"id": 101, "shape": "car", "xyz_m": (14, 0, 0)},
+            {"id": 201, "shape": "pedestrian", "xyz_m": (25, 0, 0)},
+            {"id": 202, "shape": "pedestrian", "xyz_m": (25, 4, 0)},
+        ],
+        radars=[{"name": "r", "profile": "awrl1432", "xyz_m": (2.0, 0.0, 1.0)}],
+    )
+
+
+def test_what_a_car_hides_from_the_bumper_and_not_from_the_roof_is_left_out_on_request() -> None:
+    roof = LidarMount(xyz_m=(0, 0, 2.5), channels=64, range_m=100, points_per_second=600_000)
+    seen = srt.cast_lidar(_street_with_a_walker_behind_a_car(), roof)
+    mount = srt.Pose((2.0, 0.0, 1.0))
+    assert np.count_nonzero(seen.object_id == 201) >= 5  # head and shoulders, over the car's roof
+    kept = seen.hide_occluded(mount)
+    count = {i: (np.count_nonzero(kept.object_id == i), np.count_nonzero(seen.object_id == i)) for i in (1, 101, 202)}
+    # a patch here and there covers no line of sight: of the hidden walker two points may stay, as may not of the rest
+    assert np.count_nonzero(kept.object_id == 201) <= 2
+    assert count[202][0] == count[202][1]  # beside the car
+    # the car hides its own roof's far side, and 60 m of road behind itself: a strip of 2 in 30 m
+    assert count[101][0] > 0.8 * count[101][1]
+    assert 0.95 * count[1][1] < count[1][0] < count[1][1]
+    assert "hidden from the radar by nearer points" in kept.notes[-1]
+    # from the LiDAR's own place everything that it sees is in sight
+    assert len(seen.hide_occluded(srt.Pose((0.0, 0.0, 2.5)))) == len(seen)
+
+
+def test_a_road_at_grazing_incidence_hides_nothing_of_itself(frame: srt.LidarFrame) -> None:
+    road = frame.select(frame.tag == 1)
+    assert not np.any(hidden_from_radar(road, srt.Pose((2.0, 0.0, 0.3))))
 
 
 # ---- echoes

@@ -54,6 +54,7 @@ class _Options:
     grid: str | None
     crop_ego: str | None
     crop_old_pipeline: bool
+    hide_occluded: bool
     thin: float | None
     normals: bool
     model: str
@@ -72,6 +73,7 @@ def lidar(
     grid: str | None = None,
     crop_ego: str | None = None,
     crop_old_pipeline: Annotated[bool, Parameter(negative=())] = False,
+    hide_occluded: Annotated[bool, Parameter(negative=())] = False,
     thin: float | None = None,
     normals: bool = True,
     output: Output = None,
@@ -111,6 +113,8 @@ def lidar(
         length,width,height of the ego vehicle: points inside are left out.
     crop_old_pipeline
         Leave out what the LiDAR pipeline before this one did: keep x 0.5 to 120, abs(y) < 30, z > -2.2 m.
+    hide_occluded
+        Leave out points that nearer ones hide from the radar: a LiDAR on the roof looks over cars, a radar does not.
     thin
         One point a voxel of this edge in m; area is kept.
     normals
@@ -132,8 +136,8 @@ def lidar(
         raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
     sides = [str(p) for p in side_file or ()]
     options = _Options(
-        tag_table, frame, origin, sensor_pose, mount, sides, ego_velocity, grid, crop_ego, crop_old_pipeline, thin,
-        normals, model, accuracy,
+        tag_table, frame, origin, sensor_pose, mount, sides, ego_velocity, grid, crop_ego, crop_old_pipeline,
+        hide_occluded, thin, normals, model, accuracy,
     )  # fmt: skip
     overrides = Overrides(set_)
     overrides.only_profile("lidar")
@@ -208,6 +212,8 @@ def _read(file: Path, side: str | None, options: _Options) -> LidarFrame:
         frame = frame.crop_old_pipeline()
     if o.normals and frame.normal is None and o.model == "physical":
         frame = frame.with_normals()  # before thinning: neighbours on the sensor's grid are what a plane is fitted to
+    if o.hide_occluded:
+        frame = frame.hide_occluded(_pose("mount", o.mount))
     if o.thin is not None:
         frame = frame.thin(o.thin)
     return frame if o.normals else frame.without_normals()

@@ -157,6 +157,19 @@ class LidarFrame:
 
         return self.select(*crop_old_pipeline(self))
 
+    def hide_occluded(self, mount: Pose | None = None) -> Self:
+        """Return the frame without the points that others hide from a radar; see :func:`hidden_from_radar`.
+
+        Parameters
+        ----------
+        mount : Pose, optional
+            Radar in the ego frame.
+        """
+        from .occlusion import hidden_from_radar
+
+        hidden = hidden_from_radar(self, mount)
+        return self.select(~hidden, f"hidden from the radar by nearer points: {int(hidden.sum())} points left out")
+
     def thin(self, voxel_m: float) -> LidarFrame:
         """Return one point a voxel, which stands for the area of all points in it; see :func:`thin`."""
         from .crops import thin
