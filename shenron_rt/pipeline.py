@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from .echo.shenron import ShenronModel
 
 __all__ = ["Frame", "simulate", "simulate_all"]
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,11 @@ def _processed(
     """Run the chain from scatterers on; it is the same behind both doors."""
     seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
     returns = illuminate(scatterers, used, model=model, materials=materials)
+    if not returns.calibrated:
+        _log.warning(
+            "echo model %s gives the counts of the released code, not watts: levels in dBm, SNR and RCS mean nothing",
+            returns.model,
+        )
     adc = synthesize(returns, used, noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)

@@ -88,6 +88,15 @@ class Returns:
         delay: FloatArray = 2.0 / SPEED_OF_LIGHT * np.linalg.norm(self.position, axis=1)
         return delay
 
+    @property
+    def calibrated(self) -> bool:
+        """Whether amplitudes are sqrt(W); ``shenron`` without its switch ``calibrated`` has the released counts."""
+        if not self.model.startswith("shenron"):
+            return True
+        from .echo.shenron import ShenronModel
+
+        return ShenronModel.parse(self.model).calibrated
+
     def power_by_object(self) -> dict[int, float]:
         """Return received power of every object [W].
 

@@ -145,6 +145,7 @@ def test_crops_thinning_and_normals_are_named_options(folder: Path, capsys: pyte
         (["--sensor-pose", "0,0,2.4", "--profile", "awrl"], "awrl1432"),
         (["--sensor-pose", "0,0,2.4", "--model", "magic"], "unknown echo model 'magic'"),
         (["--side-file", "side.yaml", "--side-file", "moving.yaml"], "one for all frames or one each"),
+        (["--side-file", "."], "--side-file .: no frame.meta.yaml or frame.yaml for frame.bin"),
         (["--frames", "0:2"], "1 files are given"),
         (["--seed", "-1"], "--seed -1"),
         (["--set", "scene.seed=3"], "lidar has no scene"),
@@ -171,6 +172,33 @@ def test_a_tag_table_and_axes_must_be_named(folder: Path, capsys: pytest.Capture
     assert "at least one file" in capsys.readouterr().err
     assert _run(file="absent.ply") == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_a_folder_of_side_files_has_one_for_each_frame_by_its_name(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded = folder / "recorded"
+    recorded.mkdir()
+    for name, ego in (("roof_7.meta.yaml", 0), ("roof_8.yaml", 10)):
+        (recorded / name).write_text(SIDE.format(ego=ego))
+    for name in ("roof_7.bin", "roof_8.bin"):
+        write_bin(recorded / name, street())
+    files = ["recorded/roof_7.bin", "recorded/roof_8.bin"]
+    argv = ["lidar", *files, "--tag-table", "0.9.14", "--frame", "carla", "--side-file", "recorded"]
+    assert main([*argv, "--mount", BEHIND, "--no-pictures", "--json", "-o", "run"]) == 0
+    capsys.readouterr()
+    rows = [
+        srt.Scatterers.load(folder / "run" / "radars" / "awrl1432" / f"frame_00000{k}" / "scatterers.npz")
+        for k in (0, 1)
+    ]
+    # the car drives 2 m/s; behind it stands the ego vehicle, then it drives 10 m/s
+    assert [np.sign(np.median(r.range_rate[r.object_id == CAR_ID])) for r in rows] == [1, -1]
+
+
+def test_counts_of_the_released_model_are_said_to_be_no_watts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for model, warned in (("shenron:as_released", True), ("shenron", False)):
+        assert _run("--sensor-pose", "0.3,0,2.4", "--model", model, "--no-pictures", "--overwrite", "-o", "run") == 0
+        assert ("counts of the released code, not watts" in capsys.readouterr().err) == warned
 
 
 def test_points_hidden_from_the_radar_are_left_out_on_request(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -104,7 +104,8 @@ def lidar(
     mount
         Radar in the ego frame, x,y,z[,yaw,pitch,roll].
     side_file
-        Velocities of actors and poses: one for all frames, or one each.
+        Velocities of actors and poses: one for all frames, one each, or a folder: of a frame roof_7.bin it has
+        roof_7.meta.yaml or roof_7.yaml.
     ego_velocity
         Of the ego vehicle over ground, x,y,z in ego axes, y left, m/s.
     grid
@@ -134,7 +135,7 @@ def lidar(
         raise InputError("lidar: give at least one file")
     if seed < 0:
         raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
-    sides = [str(p) for p in side_file or ()]
+    sides = _side_files(side_file or [], files)
     options = _Options(
         tag_table, frame, origin, sensor_pose, mount, sides, ego_velocity, grid, crop_ego, crop_old_pipeline,
         hide_occluded, thin, normals, model, accuracy,
@@ -145,8 +146,6 @@ def lidar(
     wanted = frame_range(frames) if frames else range(len(files))
     if wanted.stop > len(files):
         raise InputError(f"--frames {frames}: {len(files)} files are given, 0:{len(files)} is all of them")
-    if len(sides) not in (0, 1, len(files)):
-        raise InputError(f"--side-file: one for all frames or one each; {len(sides)} are given for {len(files)} files")
     default = partial(runs.default_folder, files[wanted.start].stem, "+".join(p.name for p in chosen))
     started = clock.perf_counter()
     with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
@@ -162,6 +161,25 @@ def lidar(
         show_run(summary)
         say(f"{place.folder}: written in {clock.perf_counter() - started:.1f} s")
     return 0
+
+
+def _side_files(given: Sequence[Path], files: Sequence[Path]) -> list[str]:
+    """Return the side files: none, one for all, or one each."""
+    if len(given) == 1 and given[0].is_dir():
+        return [_side_of(file, given[0]) for file in files]
+    if len(given) not in (0, 1, len(files)):
+        raise InputError(
+            f"--side-file: one for all frames or one each, or their folder; {len(given)} are given for {len(files)}"
+        )
+    return [str(path) for path in given]
+
+
+def _side_of(file: Path, folder: Path) -> str:
+    names = [f"{file.stem}.meta.yaml", f"{file.stem}.yaml"]
+    for name in names:
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise InputError(f"--side-file {folder}: no {' or '.join(names)} for {file}")
 
 
 def _numbers(option: str, text: str, counts: tuple[int, ...]) -> list[float]:

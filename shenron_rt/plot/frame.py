@@ -48,7 +48,10 @@ def write_pictures(
     from ..dsp import noise_threshold
 
     cube, found = frame.cube, frame.detections
-    truth = truth_of(getattr(frame, "returns", None), names)
+    returns = getattr(frame, "returns", None)
+    truth = truth_of(returns, names)
+    if returns is not None and not returns.calibrated:
+        title = f"{title} (released counts, not dBm)".strip()
     head = f"{title} \u2013 " if title else ""
     figures = {
         "range_profile": range_profile(
