@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from lidar_tools import CAR_ID, ply_text, street, write_bin
+from lidar_tools import CAR_ID, WALL_X, ply_text, street, write_bin
 
 import shenron_rt as srt
 from shenron_rt.cli import main
@@ -199,6 +199,30 @@ def test_counts_of_the_released_model_are_said_to_be_no_watts(folder: Path, caps
     for model, warned in (("shenron:as_released", True), ("shenron", False)):
         assert _run("--sensor-pose", "0.3,0,2.4", "--model", model, "--no-pictures", "--overwrite", "-o", "run") == 0
         assert ("counts of the released code, not watts" in capsys.readouterr().err) == warned
+
+
+def test_half_sweeps_are_joined_by_the_motion_of_the_ego(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    records = street()
+    ahead = records.copy()
+    ahead["x"] -= 0.8  # 16 m/s for 50 ms
+    write_bin(folder / "half_0.bin", records[records["y"] > 0])
+    write_bin(folder / "half_1.bin", ahead[ahead["y"] <= 0])
+    (folder / "drives.yaml").write_text(SIDE.format(ego=16))
+    argv = ["lidar", "half_0.bin", "half_1.bin", "--tag-table", "0.9.14", "--frame", "carla", "--no-pictures"]
+    argv += ["--grid", "64,10,-30,0.5"]  # the points of a shifted cloud are on none
+    more = ["--side-file", "drives.yaml", "--mount", "0.3,0,2.4", "--json", "-o", "run"]  # at the sensor
+    assert main([*argv, *more, "--merge-sweeps", "0.05"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert [f["frame"] for f in summary["radars"][0]["frames"]] == [1]  # the first file has none before it
+    assert summary["lidar"][0]["points"] == len(records)
+    rows = srt.Scatterers.load(folder / "run" / "radars" / "awrl1432" / "frame_000001" / "scatterers.npz")
+    wall = rows.position[rows.tag == srt.SemanticTag.Buildings]
+    assert np.ptp(np.sign(wall[:, 1])) == 2  # both halves
+    assert wall[:, 0] == pytest.approx(np.full(len(wall), WALL_X - 0.8), abs=1e-5)
+    assert main([*argv, "--sensor-pose", "0.3,0,2.4", "--merge-sweeps", "0.05"]) == 2
+    assert "how the ego vehicle moved" in capsys.readouterr().err
+    assert _run("--side-file", "drives.yaml", "--merge-sweeps", "0.05") == 2
+    assert "give at least two" in capsys.readouterr().err
 
 
 def test_points_hidden_from_the_radar_are_left_out_on_request(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

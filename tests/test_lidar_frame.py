@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from lidar_tools import CAR, CAR_ID, GRID, HEIGHT_M, STEP_DEG, WALL_X, street, w
 
 import shenron_rt as srt
 from shenron_rt.errors import InputError
-from shenron_rt.lidar import merge_sweeps, read_side_file
+from shenron_rt.lidar import merge_sweeps, read_side_file, sweep_motion
 from shenron_rt.lidar.grid import MIN_AREA_COS, LidarGrid, estimate_grid
 
 ROOF = srt.Pose((0.3, 0.0, HEIGHT_M))
@@ -259,6 +259,28 @@ def test_moving_actors_are_carried_to_the_later_sweep(tmp_path: Path) -> None:
     car = now.object_id == CAR_ID
     assert shift[car] == pytest.approx(np.broadcast_to([0.4, -0.05, 0.0], (car.sum(), 3)))  # 8 and -1 m/s
     assert np.abs(shift[~car]).max() < 1e-12  # there and back through the ego frame
+
+
+def test_the_motion_between_sweeps_is_that_of_velocity_and_turn_or_of_the_poses(frame: srt.LidarFrame) -> None:
+    elapsed, turn, speed = 0.05, math.radians(30.0), np.array([16.0, 0.5, 0.0])
+    moving = replace(frame, ego_velocity=speed, ego_yaw_rate=turn)
+    # the path integrated in 10,000 steps
+    place, heading, steps = np.zeros(2), 0.0, 10_000
+    for _ in range(steps):
+        middle = heading + turn * elapsed / steps / 2
+        c, s = math.cos(middle), math.sin(middle)
+        place += np.array([[c, -s], [s, c]]) @ speed[:2] * elapsed / steps
+        heading += turn * elapsed / steps
+    ahead = srt.Pose((*place, 0.0), (math.degrees(heading), 0.0, 0.0))
+    motion = sweep_motion(moving, elapsed)
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    assert motion.apply(ahead.apply(corners)) == pytest.approx(corners, abs=1e-9)
+    # the same from the sensor's poses in a world, whatever the velocities say
+    world = srt.Pose((100.0, 50.0, 0.2), (40.0, 3.0, 0.0))
+    earlier, now = world.compose(ROOF), world.compose(ahead).compose(ROOF)
+    assert sweep_motion(frame, elapsed, now, earlier).apply(corners) == pytest.approx(motion.apply(corners), abs=1e-9)
+    with pytest.raises(InputError, match="how the ego vehicle moved"):
+        sweep_motion(frame, elapsed)
 
 
 def test_sweeps_that_do_not_belong_together_are_refused(frame: srt.LidarFrame) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..frames import Pose
+from ._lidar_input import LidarOptions, pose_of, read_frame, side_files
 from .common import (
     Json,
     Output,
@@ -40,27 +39,6 @@ _MOUNT = "2,0,1"
 _DEFAULT_RANGE_M = 10.0
 
 
-@dataclass(frozen=True)
-class _Options:
-    """What the caller says of the files, as it is written into config.yaml."""
-
-    tag_table: str
-    frame: Literal["carla", "ros"]
-    origin: Literal["sensor", "ego", "world"]
-    sensor_pose: str | None
-    mount: str
-    side_file: list[str]
-    ego_velocity: str | None
-    grid: str | None
-    crop_ego: str | None
-    crop_old_pipeline: bool
-    hide_occluded: bool
-    thin: float | None
-    normals: bool
-    model: str
-    accuracy: float
-
-
 def lidar(
     *files: Path,
     tag_table: str,
@@ -73,6 +51,7 @@ def lidar(
     grid: str | None = None,
     crop_ego: str | None = None,
     crop_old_pipeline: Annotated[bool, Parameter(negative=())] = False,
+    merge_sweeps: float | None = None,
     hide_occluded: Annotated[bool, Parameter(negative=())] = False,
     thin: float | None = None,
     normals: bool = True,
@@ -114,6 +93,8 @@ def lidar(
         length,width,height of the ego vehicle: points inside are left out.
     crop_old_pipeline
         Leave out what the LiDAR pipeline before this one did: keep x 0.5 to 120, abs(y) < 30, z > -2.2 m.
+    merge_sweeps
+        Seconds between two files that each hold a part of a turn: every file is joined with the one before it.
     hide_occluded
         Leave out points that nearer ones hide from the radar: a LiDAR on the roof looks over cars, a radar does not.
     thin
@@ -135,10 +116,10 @@ def lidar(
         raise InputError("lidar: give at least one file")
     if seed < 0:
         raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
-    sides = _side_files(side_file or [], files)
-    options = _Options(
+    sides = side_files(side_file or [], files)
+    options = LidarOptions(
         tag_table, frame, origin, sensor_pose, mount, sides, ego_velocity, grid, crop_ego, crop_old_pipeline,
-        hide_occluded, thin, normals, model, accuracy,
+        merge_sweeps, hide_occluded, thin, normals, model, accuracy,
     )  # fmt: skip
     overrides = Overrides(set_)
     overrides.only_profile("lidar")
@@ -146,6 +127,8 @@ def lidar(
     wanted = frame_range(frames) if frames else range(len(files))
     if wanted.stop > len(files):
         raise InputError(f"--frames {frames}: {len(files)} files are given, 0:{len(files)} is all of them")
+    if merge_sweeps is not None:
+        wanted = _with_an_earlier(wanted, merge_sweeps)
     default = partial(runs.default_folder, files[wanted.start].stem, "+".join(p.name for p in chosen))
     started = clock.perf_counter()
     with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
@@ -163,40 +146,14 @@ def lidar(
     return 0
 
 
-def _side_files(given: Sequence[Path], files: Sequence[Path]) -> list[str]:
-    """Return the side files: none, one for all, or one each."""
-    if len(given) == 1 and given[0].is_dir():
-        return [_side_of(file, given[0]) for file in files]
-    if len(given) not in (0, 1, len(files)):
-        raise InputError(
-            f"--side-file: one for all frames or one each, or their folder; {len(given)} are given for {len(files)}"
-        )
-    return [str(path) for path in given]
-
-
-def _side_of(file: Path, folder: Path) -> str:
-    names = [f"{file.stem}.meta.yaml", f"{file.stem}.yaml"]
-    for name in names:
-        if (folder / name).is_file():
-            return str(folder / name)
-    raise InputError(f"--side-file {folder}: no {' or '.join(names)} for {file}")
-
-
-def _numbers(option: str, text: str, counts: tuple[int, ...]) -> list[float]:
-    """Return the numbers of ``a,b,c``."""
-    try:
-        values = [float(word) for word in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) not in counts:
-        needed = " or ".join(str(c) for c in counts)
-        raise InputError(f"--{option} {text}: {needed} numbers separated by commas are needed")
-    return values
-
-
-def _pose(option: str, text: str) -> Pose:
-    values = [*_numbers(option, text, (3, 6)), 0.0, 0.0, 0.0]
-    return Pose((values[0], values[1], values[2]), (values[3], values[4], values[5]))
+def _with_an_earlier(wanted: range, seconds: float) -> range:
+    """Return the frames that have a sweep before them."""
+    if not 0 < seconds <= 1:
+        raise InputError(f"--merge-sweeps {seconds:g}: the time between two files in seconds, up to 1, is needed")
+    kept = range(max(wanted.start, 1), wanted.stop)
+    if not kept:
+        raise InputError("--merge-sweeps: every file is joined with the one before it; give at least two")
+    return kept
 
 
 def _profiles(names: Sequence[str], overrides: Mapping[str, str]) -> list[RadarProfile]:
@@ -209,39 +166,11 @@ def _profiles(names: Sequence[str], overrides: Mapping[str, str]) -> list[RadarP
     return loaded
 
 
-def _read(file: Path, side: str | None, options: _Options) -> LidarFrame:
-    """Read one file, with the crops and normals asked for."""
-    from ..lidar.read import read_semantic_lidar
-
-    o = options
-    frame = read_semantic_lidar(
-        file,
-        tag_table=o.tag_table,
-        frame=o.frame,
-        origin=o.origin,
-        sensor_pose=None if o.sensor_pose is None else _pose("sensor-pose", o.sensor_pose),
-        side_file=side,
-        ego_velocity=None if o.ego_velocity is None else _numbers("ego-velocity", o.ego_velocity, (3,)),
-        grid=None if o.grid is None else _numbers("grid", o.grid, (4,)),
-    )
-    if o.crop_ego is not None:
-        frame = frame.crop_ego(*_numbers("crop-ego", o.crop_ego, (3,)))
-    if o.crop_old_pipeline:
-        frame = frame.crop_old_pipeline()
-    if o.normals and frame.normal is None and o.model == "physical":
-        frame = frame.with_normals()  # before thinning: neighbours on the sensor's grid are what a plane is fitted to
-    if o.hide_occluded:
-        frame = frame.hide_occluded(_pose("mount", o.mount))
-    if o.thin is not None:
-        frame = frame.thin(o.thin)
-    return frame if o.normals else frame.without_normals()
-
-
 def _render(
     files: Sequence[Path],
     wanted: range,
     chosen: Sequence[RadarProfile],
-    options: _Options,
+    options: LidarOptions,
     seed: int,
     root: Path,
     *,
@@ -253,15 +182,12 @@ def _render(
     from ..lidar.door import door_counts
     from ..pipeline import simulate
 
-    mount = _pose("mount", options.mount)
+    mount = pose_of("mount", options.mount)
     records: dict[str, list[dict[str, Any]]] = {p.name: [] for p in chosen}
     points = []
     with progress(len(wanted) * len(chosen), "simulating", quiet=quiet) as step:
         for index in wanted:
-            side = None
-            if options.side_file:
-                side = options.side_file[index if len(options.side_file) > 1 else 0]
-            read = _read(files[index], side, options)
+            read = read_frame(files, index, options)
             points.append({"frame": index} | read.summary())
             for used in chosen:
                 step(f"{used.name} frame {index}")
@@ -298,7 +224,7 @@ def _draw(folder: Path, file: Path, read: LidarFrame, done: Frame) -> None:
 
 
 def _write_config(
-    path: Path, files: Sequence[Path], options: _Options, seed: int, chosen: Sequence[RadarProfile]
+    path: Path, files: Sequence[Path], options: LidarOptions, seed: int, chosen: Sequence[RadarProfile]
 ) -> None:
     import dataclasses
 
@@ -330,7 +256,7 @@ def _show(item: Mapping[str, Any]) -> None:
         if item["reach_m"] <= _DEFAULT_RANGE_M
         else ""
     )
-    part = "; a part of a sweep, merge_sweeps joins them" if item["azimuth_covered_deg"] < 330 else ""
+    part = "; a part of a sweep, --merge-sweeps joins two" if item["azimuth_covered_deg"] < 330 else ""
     say(f"reach: {item['reach_m']:.1f} m over {item['azimuth_covered_deg']:.0f} of 360 deg{part}{short}")
     say(
         f"incidence: {door['cosine_from_normal']} points from estimated normals as the radar sees them "

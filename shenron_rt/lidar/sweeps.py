@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..frames import Pose
 from .frame import LidarFrame
 
-__all__ = ["merge_sweeps"]
+__all__ = ["merge_sweeps", "sweep_motion"]
 
 
 def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_s: float = 0.0) -> LidarFrame:
@@ -65,6 +65,46 @@ def merge_sweeps(now: LidarFrame, earlier: LidarFrame, motion: Pose, *, elapsed_
         n_read=now.n_read + earlier.n_read,
         n_clipped=now.n_clipped + earlier.n_clipped,
     )
+
+
+def sweep_motion(
+    now: LidarFrame, elapsed_s: float, world_now: Pose | None = None, world_earlier: Pose | None = None
+) -> Pose:
+    """Return how the ego vehicle moved between two sweeps: the ``motion`` of :func:`merge_sweeps`.
+
+    Parameters
+    ----------
+    now : LidarFrame
+        Its ego velocity and yaw rate count where the poses are not known.
+    elapsed_s : float
+        Time from the earlier sweep to this one [s].
+    world_now, world_earlier : Pose, optional
+        Sensor in the world at either sweep, as side files with CARLA's transforms have it.
+
+    Returns
+    -------
+    Pose
+        Earlier ego frame in the present one; that of the sensor where it has no pose.
+
+    Raises
+    ------
+    InputError
+        Neither poses nor an ego velocity.
+    """
+    mount = now.sensor_pose or Pose()
+    if world_now is not None and world_earlier is not None:
+        return mount.compose(world_now.inverse()).compose(world_earlier).compose(mount.inverse())
+    if now.ego_velocity is None:
+        raise InputError(
+            f"{now.path}: sweeps are joined by how the ego vehicle moved; give side files with sensor_transform of "
+            "each tick, or the ego velocity"
+        )
+    # a constant velocity in ego axes and a constant turn: the mean of R(w t) v over the time
+    turn = now.ego_yaw_rate * elapsed_s
+    along, across = np.sinc(turn / np.pi), np.sinc(turn / (2 * np.pi)) ** 2 * turn / 2
+    x, y, z = (float(v) for v in now.ego_velocity * elapsed_s)
+    ahead = Pose((along * x - across * y, across * x + along * y, z), (float(np.degrees(turn)), 0.0, 0.0))
+    return ahead.inverse()
 
 
 def _turned(normal: FloatArray, turn: FloatArray) -> FloatArray:
