@@ -68,7 +68,8 @@ def released_class(tags: IntArray) -> IntArray:
     if np.any(wrong):
         raise InputError(
             f"the released tag table knows 0 to {len(RELEASED_CLASS) - 1} (CARLA up to 0.9.13), got "
-            f"{np.unique(numbers[wrong])[:8].tolist()}; name the table of later versions (ShenronRadarModel(tags='0.9.14'), --tag-table 0.9.14)"
+            f"{np.unique(numbers[wrong])[:8].tolist()}; name the table of later "
+            "versions (ShenronRadarModel(tags='0.9.14'), --tag-table 0.9.14)"
         )
     return np.asarray(RELEASED_CLASS[numbers])
 
