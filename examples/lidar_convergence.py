@@ -121,7 +121,7 @@ def causes(place: srt.Scene, mesh: Powers, seeds: int) -> list[tuple[str, list[f
     return [
         ("LiDAR at the radar, materials carried", seen(RADAR, materials=True)),
         (
-            "... and normals: plane of incidence right, mirror-like part added",
+            "... and normals: mirror-like part added",
             seen(RADAR, materials=True, normals=True),
         ),
         ("LiDAR at the radar, tags alone", seen(RADAR)),

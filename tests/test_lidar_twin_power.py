@@ -20,7 +20,6 @@ PROFILE = srt.load_profile("awrl1432")
 RADAR = srt.Pose((2.0, 0.0, 1.0))
 ROOF = srt.Pose((0.0, 0.0, 2.5))
 GROUND = {"id": 1, "shape": "ground:80x30", "xyz_m": (42, 0, 0), "tag": "Roads", "material": "asphalt"}
-#: Faces the radar, so that its plane of incidence is vertical nearly everywhere, which a LiDAR door assumes.
 BLOCK = {
     "id": 2,
     "shape": "box:4x3x3",
@@ -81,21 +80,18 @@ def test_power_per_object_converges_within_half_a_decibel_from_1x_to_100x():
     scene = _scene(GROUND, SIDE_WALL, actors=(CAR, WALKER))
     mesh = _mesh(scene, rays=100_000)
     off = {d: decibels(_lidar(scene, d, materials=True), mesh) for d in (1, 10, 100)}
-    # the wall's plane of incidence is the test below: with its normals it is within the bar, without just outside
-    wall = decibels(_lidar(_scene(SIDE_WALL), 100, materials=True, normals=True), {3: mesh[3]})[3]
-    assert all(abs(off[100][i]) < 0.5 for i in (1, 101, 102)), off
-    assert abs(wall) < 0.5, off
-    assert abs(off[100][3]) < 0.7, off
+    assert set(off[100]) == {1, 3, 101, 102}
+    assert max(abs(v) for v in off[100].values()) < 0.5, off
 
 
-def test_what_is_left_on_a_wall_beside_the_road_is_its_plane_of_incidence():
+def test_a_wall_beside_the_road_has_its_plane_of_incidence_by_its_tag_or_by_its_normals():
     scene = _scene(SIDE_WALL)
     mesh = _mesh(scene)
-    without, known = (decibels(_lidar(scene, 4, materials=True, normals=n), mesh)[3] for n in (False, True))
-    # V lies across the plane of incidence of an upright wall; without a normal it is taken to lie in it
-    assert without < known - 0.2
+    by_tag, by_normal = (decibels(_lidar(scene, 4, materials=True, normals=n), mesh)[3] for n in (False, True))
+    # V lies across the plane of incidence of an upright wall; taken to lie in it, 0.44 dB are missing
+    assert by_tag == pytest.approx(by_normal, abs=0.01)
     # 500 points over 20 seeds leave 0.05 dB, the mesh door as much; the wall has no mirror point
-    assert abs(known) < 0.2
+    assert abs(by_normal) < 0.2
 
 
 @pytest.mark.parametrize("ahead_m", [14.0, pytest.param(27.0, marks=pytest.mark.slow)])

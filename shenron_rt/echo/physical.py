@@ -27,6 +27,7 @@ from ..scatterers import Scatterers
 from .bounced import path_amplitude
 from .glint import points_sigma0
 from .link import link_amplitude
+from .plane import across_share
 
 if TYPE_CHECKING:
     from ..config.materials import MaterialTable
@@ -163,7 +164,7 @@ class _Curves(NamedTuple):
         rows: IntArray,
     ) -> _Curves:
         n, cos = len(rows), scatterers.cos_incidence
-        turned = np.zeros(n) if scatterers.normal is None else _across_share(scatterers.normal[rows], direction[rows])
+        turned = across_share(scatterers.select(rows) if n < len(scatterers) else scatterers, direction[rows])
         te, tm = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.complex128)
         sigma0, roughness = np.zeros(n), np.zeros(n)
         place = np.clip(cos[rows], 0.0, 1.0) * (_TABLE - 1)
@@ -181,15 +182,6 @@ class _Curves(NamedTuple):
                 sigma0[here] += turned[here] * (other - sigma0[here])
             roughness[here] = table.roughness_m
         return cls(te, tm, sigma0, roughness)
-
-
-def _across_share(normal: FloatArray, u: FloatArray) -> FloatArray:
-    """Return sin^2 of the angle between the antenna's V and the plane of incidence: n_H^2 / (n_H^2 + n_V^2)."""
-    horizontal = np.hypot(u[:, 0], u[:, 1])
-    n_h = normal[:, 1] * u[:, 0] - normal[:, 0] * u[:, 1]
-    n_v = horizontal**2 * normal[:, 2] - u[:, 2] * (normal[:, 0] * u[:, 0] + normal[:, 1] * u[:, 1])
-    total = n_h**2 + n_v**2
-    return np.divide(n_h**2, total, out=np.zeros_like(total), where=total > 0)
 
 
 def _names(scatterers: Scatterers, materials: MaterialTable) -> tuple[str, ...]:
