@@ -164,7 +164,7 @@ class _Curves(NamedTuple):
         rows: IntArray,
     ) -> _Curves:
         n, cos = len(rows), scatterers.cos_incidence
-        turned = across_share(scatterers.select(rows) if n < len(scatterers) else scatterers, direction[rows])
+        turned = across_share(scatterers, rows, direction[rows])
         te, tm = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.complex128)
         sigma0, roughness = np.zeros(n), np.zeros(n)
         place = np.clip(cos[rows], 0.0, 1.0) * (_TABLE - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..scatterers import Scatterers
 from ..tags import SemanticTag
 
@@ -17,7 +17,7 @@ _UPRIGHT[
 ] = True
 
 
-def across_share(scatterers: Scatterers, direction: FloatArray) -> FloatArray:
+def across_share(scatterers: Scatterers, rows: IntArray, direction: FloatArray) -> FloatArray:
     """Return sin^2 of the angle between the antenna's V and the plane of incidence.
 
     Parameters
@@ -25,22 +25,23 @@ def across_share(scatterers: Scatterers, direction: FloatArray) -> FloatArray:
     scatterers : Scatterers
         Rows without a normal are taken to stand upright where their tag says so, with what their cosine leaves open,
         and elsewhere to have V in the plane, as level ground has.
-    direction : (n, 3) float
-        From the radar, unit vectors.
+    rows : (k,) int
+    direction : (k, 3) float
+        From the radar to the rows, unit vectors.
 
     Returns
     -------
-    (n,) float
+    (k,) float
         n_H^2 / (n_H^2 + n_V^2); of an upright surface n_H^2 = cos^2(el) - cos^2(theta), n_V = sin(el) cos(theta).
     """
     u = direction
     sine = u[:, 2] ** 2
-    c = scatterers.cos_incidence**2
-    upright = _UPRIGHT[scatterers.tag]
+    c = scatterers.cos_incidence[rows] ** 2
+    upright = _UPRIGHT[scatterers.tag[rows]]
     n_h = np.where(upright, np.maximum(1.0 - sine - c, 0.0), 0.0)
     n_v = np.where(upright, sine * c, 1.0)
     if scatterers.normal is not None:
-        normal = scatterers.normal
+        normal = scatterers.normal[rows]
         known = np.any(normal != 0.0, axis=1)
         h = normal[:, 1] * u[:, 0] - normal[:, 0] * u[:, 1]
         v = (1.0 - sine) * normal[:, 2] - u[:, 2] * (normal[:, 0] * u[:, 0] + normal[:, 1] * u[:, 1])
