@@ -70,11 +70,13 @@ def test_the_terms_of_a_difference_add_up_whatever_differs() -> None:
     assert min(abs(record.terms_db[k]) for k in ("coverage", "incidence", "material", "range", "weather")) > 0.1
 
 
-def test_another_angle_of_incidence_is_named_with_what_sigma0_predicts() -> None:
-    a, b = (frame_of(scatterers_of(patch(7, AT, cosine=c))) for c in (0.95, 0.1))
+@pytest.mark.parametrize(("tag", "polarization"), [(SemanticTag.Roads, "VV"), (SemanticTag.Walls, "HH")])
+def test_another_angle_of_incidence_is_named_with_what_sigma0_predicts(tag: SemanticTag, polarization: str) -> None:
+    # V lies in the plane of incidence of level ground and across that of an upright wall
+    a, b = (frame_of(scatterers_of(patch(7, AT, cosine=c, tag=tag, material="concrete"))) for c in (0.95, 0.1))
     record = only_object(a, b)
-    concrete = srt.load_materials()["concrete"]
-    predicted = np.diff(10 * np.log10(concrete.sigma0(a.profile.center_hz, np.array([0.95, 0.1]))))[0]
+    sigma0 = srt.load_materials()["concrete"].sigma0(a.profile.center_hz, np.array([0.95, 0.1]), polarization)
+    predicted = np.diff(10 * np.log10(sigma0))[0]
     assert record.cause == "incidence"
     # both sides interpolate sigma0 over 1025 cosines
     assert record.terms_db["incidence"] == pytest.approx(predicted, abs=0.05)

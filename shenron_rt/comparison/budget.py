@@ -15,10 +15,11 @@ import numpy as np
 from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED
 from ..echo.link import link_amplitude
+from ..echo.plane import across_share
 from ..frames import spherical
 from ..scatterers import Scatterers
 from .sides import Side
-from .surfaces import COSINES, Palette, material_index, mirror_sigma0
+from .surfaces import Palette, material_index, mirror_sigma0
 
 if TYPE_CHECKING:
     from ..config.profile import RadarProfile
@@ -139,9 +140,10 @@ def budget_of(side: Side, common: RadarProfile, grouping: Grouping, palette: Pal
     area = np.nan_to_num(np.zeros(len(s)) if s.area is None else s.area)
     area = np.where(given, 0.0 if s.rcs is None else np.nan_to_num(s.rcs), area * _in_beam(s, common, own))
     total = grouping.sum(index, area)
-    sigma, shares = _surfaces(side, grouping, index, np.where(given, 0.0, area), palette, keys)
+    across = across_share(s, np.arange(len(s)), s.position / np.maximum(s.range, 1e-12)[:, None])
+    means = {k: palette.sigma0(k, s.cos_incidence, across) for k in palette.curves}
+    sigma, shares = _surfaces(side, grouping, index, np.where(given, 0.0, area), means, keys)
     sigma = np.where(given, 1.0, sigma)
-    means = {k: np.interp(s.cos_incidence, COSINES, curve) for k, curve in palette.curves.items()}
     curves = {k: _ratio(grouping.sum(index, area * value), total) for k, value in means.items()}
     shares = {k: _ratio(v, total) for k, v in shares.items()}
     shares[_POINT] = _ratio(grouping.sum(index, np.where(given, area, 0.0)), total)
@@ -232,7 +234,12 @@ def _gain(profile: RadarProfile, s: Scatterers, *, weather: bool) -> FloatArray:
 
 
 def _surfaces(
-    side: Side, grouping: Grouping, index: IntArray, area: FloatArray, palette: Palette, keys: dict[str, str]
+    side: Side,
+    grouping: Grouping,
+    index: IntArray,
+    area: FloatArray,
+    means: dict[str, FloatArray],
+    keys: dict[str, str],
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Return (n,) sigma0 of every row, and the area of each material by group."""
     s = side.scatterers
@@ -241,7 +248,7 @@ def _surfaces(
     sigma, areas = np.zeros(len(s)), {}
     for i in np.unique(number):
         here, key = number == i, keys[names[i]]
-        sigma[here] = np.interp(s.cos_incidence[here], COSINES, palette.curves[key])
+        sigma[here] = means[key][here]
         areas[key] = grouping.sum(index, np.where(here, area, 0.0))
     return sigma, areas
 

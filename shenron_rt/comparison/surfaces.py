@@ -9,6 +9,7 @@ import numpy as np
 
 from .._typing import FloatArray, IntArray
 from ..echo.glint import points_sigma0
+from ..echo.plane import swapped
 from .sides import Side
 
 __all__ = ["COSINES", "Palette", "material_index", "mirror_sigma0", "used_materials"]
@@ -23,8 +24,8 @@ class Palette:
 
     Parameters
     ----------
-    curves : dict of str to (k,) float
-        sigma0 over a grid of cosines.
+    curves : dict of str to (2, k) float
+        sigma0 over a grid of cosines, with the antenna's polarisation in the plane of incidence, and across it.
     of_a, of_b : dict of str to str
         Material name -> key of ``curves``.
     """
@@ -32,6 +33,11 @@ class Palette:
     curves: dict[str, FloatArray]
     of_a: dict[str, str]
     of_b: dict[str, str]
+
+    def sigma0(self, key: str, cosine: FloatArray, across: FloatArray) -> FloatArray:
+        """Return (n,) sigma0 of a material at some cosines; ``across`` is the share of V across the plane."""
+        in_plane, other = (np.interp(cosine, COSINES, curve) for curve in self.curves[key])
+        return np.asarray(in_plane + across * (other - in_plane), dtype=np.float64)
 
     @classmethod
     def of(cls, a: Side, b: Side, used: tuple[set[str], set[str]] | None = None) -> Palette:
@@ -87,12 +93,13 @@ def used_materials(side: Side) -> set[str]:
 
 
 def _sigma0_grid(side: Side, name: str) -> FloatArray:
-    """Return sigma0 of a material of a side over the grid of cosines, in the antenna's polarisation and weather."""
+    """Return (2, k) sigma0 of a material of a side over the grid of cosines, in and across the plane."""
     assert side.materials is not None
     assert side.profile is not None
     material = side.materials[_in_weather(side, name)]
     cosine = np.maximum(COSINES, 1e-6)
-    return np.asarray(material.sigma0(side.profile.center_hz, cosine, side.profile.antenna.polarization))
+    own = side.profile.antenna.polarization
+    return np.stack([material.sigma0(side.profile.center_hz, cosine, p) for p in (own, swapped(own))])
 
 
 def material_index(side: Side) -> tuple[tuple[str, ...], IntArray]:

@@ -27,7 +27,7 @@ from ..scatterers import Scatterers
 from .bounced import path_amplitude
 from .glint import points_sigma0
 from .link import link_amplitude
-from .plane import across_share
+from .plane import across_share, swapped
 
 if TYPE_CHECKING:
     from ..config.materials import MaterialTable
@@ -138,7 +138,7 @@ def _tables(
         material = materials[materials.in_weather(names[number], rain)]
         te, tm = material.reflection(profile.center_hz, cos)
         # V of the antenna is the field in the plane of incidence on a road, but across it on a wall beside the road
-        across = profile.antenna.polarization.translate(str.maketrans("VH", "HV"))
+        across = swapped(profile.antenna.polarization)
         in_plane, other = (
             np.asarray(material.sigma0(profile.center_hz, cos, p)) for p in (profile.antenna.polarization, across)
         )

@@ -8,7 +8,7 @@ from .._typing import FloatArray, IntArray
 from ..scatterers import Scatterers
 from ..tags import SemanticTag
 
-__all__ = ["across_share"]
+__all__ = ["across_share", "swapped"]
 
 #: Surfaces that stand upright, for points whose normal is not known.
 _UPRIGHT = np.zeros(256, dtype=bool)
@@ -49,3 +49,8 @@ def across_share(scatterers: Scatterers, rows: IntArray, direction: FloatArray) 
     total = n_h + n_v
     share: FloatArray = np.divide(n_h, total, out=np.zeros_like(total), where=total > 0)
     return share
+
+
+def swapped(polarization: str) -> str:
+    """Return the polarisation that lies across: V of the antenna is H to a wall beside the road."""
+    return polarization.translate(str.maketrans("VH", "HV"))
