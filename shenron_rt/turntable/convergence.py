@@ -72,6 +72,8 @@ class Convergence:
         Whether the last step's median change is below it; None where nothing was asked for.
     stopped : str
         Why no finer sweep was made, in words.
+    seconds : tuple of float
+        What each sweep took [s].
     """
 
     sweeps: tuple[RcsSweep, ...]

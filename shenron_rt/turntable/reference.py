@@ -17,6 +17,8 @@ __all__ = ["Reference", "reference_of"]
 
 #: Samples further below the peak than this do not enter the mean deviation [dB].
 _WITHIN_DB = 20.0
+#: Samples beyond which the closed form of a circular trihedral, some 200 directions a second, is not waited for.
+_MOST_CIRCULAR = 4_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +55,8 @@ def reference_of(sweep: RcsSweep, target: str | None = None) -> Reference | None
     Returns
     -------
     Reference or None
-        None where there is none: another target, a near-range or a bistatic sweep, a cylinder or corner seen from
-        where its formula does not hold at all.
+        None where there is none: another target, a near-range or a bistatic sweep, a corner seen from where
+        its formula does not hold at all, a circular trihedral over thousands of samples.
 
     Notes
     -----
@@ -72,7 +74,7 @@ def reference_of(sweep: RcsSweep, target: str | None = None) -> Reference | None
         name, size = parse(text, SHAPES)
     except InputError:
         return None
-    if name not in _FORMS:
+    if name not in _FORMS or (size.get("form") == "circular" and sweep.amplitude.size > _MOST_CIRCULAR):
         return None
     words, form = _FORMS[name]
     azimuth, elevation = np.meshgrid(np.radians(sweep.azimuth_deg), np.radians(sweep.elevation_deg))
