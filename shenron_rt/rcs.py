@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ._typing import ArrayLike, ComplexArray, FloatArray, IntArray
 from .constants import SPEED_OF_LIGHT
 from .errors import InputError, did_you_mean
+from .io.npz import load_npz, save_npz
 from .physics.fresnel import POLARIZATIONS, fresnel_cos
 from .sbr.solver import Settings, scattered
 from .sbr.surface import Reflector, Surface
@@ -30,6 +31,8 @@ DEFAULT_RAYS_PER_WAVELENGTH = 1.0
 #: a corner is worth it, and costs little; a car has so many that the rest of their cells average out.
 _LEVELS = ((160.0, 3), (320.0, 2), (700.0, 1), (math.inf, 0))
 MOST_BOUNCES = 10
+#: Fields of a sweep that stay arrays when they are loaded.
+_ARRAYS = ("amplitude", "frequency_hz", "elevation_deg", "azimuth_deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +90,32 @@ class RcsSweep:
     def rcs_dbsm(self) -> FloatArray:
         """(n_freq, n_el, n_az, n_pol) RCS [dBsm], at least -120."""
         return np.asarray(10.0 * np.log10(np.maximum(self.rcs_m2, 10.0 ** (FLOOR_DBSM / 10.0))))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save every field, and ``rcs_dbsm``, to an ``.npz`` file; keys are the attribute names."""
+        return save_npz(path, {f.name: getattr(self, f.name) for f in fields(self)} | {"rcs_dbsm": self.rcs_dbsm})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Load what :meth:`save` wrote.
+
+        Raises
+        ------
+        NotFoundError, InputError
+        """
+        optional = {"distance_m": None, "bistatic_deg": None}  # left out of the file where they are None
+        values: dict[str, Any] = optional | load_npz(path, [f.name for f in fields(cls) if f.name not in optional])
+        plain = {k: v.tolist() for k, v in values.items() if v is not None and k not in _ARRAYS}
+        plain |= {k: tuple(plain[k]) for k in ("polarization", "bistatic_deg") if k in plain}
+        return cls(**{f.name: plain.get(f.name, values[f.name]) for f in fields(cls)})
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write one row for each frequency, elevation and azimuth: RCS and phase of every polarisation."""
+        from .io.rcs_table import write_rcs_table
+
+        return write_rcs_table(
+            path, self.frequency_hz, self.elevation_deg, self.azimuth_deg, self.polarization, self.amplitude, FLOOR_DBSM
+        )
 
     def __repr__(self) -> str:
         where = "far field" if self.distance_m is None else f"{self.distance_m:g} m"

@@ -28,6 +28,7 @@ LAYERS = (
     ("synthesis",),
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),
+    ("turntable",),
     ("runs",),
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page

@@ -186,6 +186,13 @@ def test_python_of_the_guide_runs(number: int) -> None:
     exec(compile(_blocks(ROOT / "docs/guide.md", "python")[number], f"guide.md-{number}", "exec"), {})
 
 
+def test_python_of_the_turntable_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (example,) = _blocks(ROOT / "docs/rcs.md", "python")
+    exec(compile(example, "rcs.md", "exec"), {})
+    assert (tmp_path / "plate.npz").is_file()
+
+
 def _commands() -> list[str]:
     text = "\n".join(block for page in PAGES for block in _blocks(page, "bash"))
     return re.findall(r"(?:^|&& )(?:\.venv/bin/)?(shenron-rt [^#&\n]*)", text, flags=re.MULTILINE)

@@ -16,6 +16,7 @@ _VERBS = {
     "run": ("run:run", "Render a mesh scene: scatterers, ADC cube, maps, detections, pictures."),
     "lidar": ("lidar:lidar", "Simulate a radar from frames of a semantic LiDAR: CARLA's PLY, .bin, .npy, LAZ ..."),
     "process": ("process:process", "Process ADC data: own cubes, plain .npy arrays, DCA1000 captures."),
+    "rcs": ("rcs:rcs", "Sweep one target on a turntable: radar cross section over frequency and aspect."),
     "cast-lidar": ("cast:cast_lidar", "Cast a semantic LiDAR over a mesh scene and write CARLA's files."),
     "compare": ("compare:compare", "Compare two runs, or a run and a recording, and say what makes them differ."),
     "resolve": ("resolve:resolve", "Show which tag every part of a mesh gets, by which rule."),

@@ -154,6 +154,8 @@ def _yaml_checker(path: Path) -> tuple[str, Callable[[Path], str]]:
     keys = set(data)
     if keys == {"process", "profile"}:
         return "record of shenron-rt process", lambda _: ""
+    if keys == {"rcs"}:
+        return "record of shenron-rt rcs", lambda _: ""
     if keys & {"waveform", "receiver", "antenna"}:
         return "profile", _profile
     if "materials" in keys and isinstance(data["materials"], dict):
@@ -262,4 +264,6 @@ def _run_folder(path: Path) -> str:
     problems = verify_manifest(path)
     if problems:
         raise InputError("\n".join(f"{path}: {p}" for p in problems))
+    if not run.radars and "peak" in run.summary:
+        return f"sweep of {run.summary['target']}"
     return f"radars {', '.join(run.radars)}, {sum(len(f) for f in run.frames.values())} frames"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ class RayCaster:
     faces : (f, 3) int
     backend : str
     """
+
+    #: Rays that this process has cast so far: what a trial of a sweep counts its cost by.
+    rays_cast: ClassVar[int] = 0
 
     def __init__(self, vertices: FloatArray, faces: IntArray, backend: Backend) -> None:
         self.backend = backend
@@ -52,6 +55,7 @@ class RayCaster:
             Where each ray starts; default: all at the origin [m].
         """
         n = directions.shape[1]
+        RayCaster.rays_cast += n
         if self._scene is None or n == 0:
             return np.full(n, -1, dtype=np.int32)
         with use_backend(self.backend) as mi:

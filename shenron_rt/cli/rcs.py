@@ -1,0 +1,278 @@
+"""``shenron-rt rcs``: one target on a turntable, its radar cross section over frequency and aspect."""
+
+from __future__ import annotations
+
+import functools
+import re
+import threading
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from .common import Json, Output, Overwrite, print_json, progress, say
+from .rcs_options import PARTS, RcsOptions, load_target, read_pair, read_permittivity
+
+if TYPE_CHECKING:
+    from ..rcs import RcsSweep
+    from ..scene.mesh import TaggedMesh
+    from ..turntable import Convergence, SweepPlan
+
+__all__ = ["rcs"]
+
+#: Longest run that is begun without being asked twice [s].
+_MAX_SECONDS = 6 * 3600.0
+_TEXT = Parameter(allow_leading_hyphen=True)
+
+
+def rcs(
+    target: str,
+    /,
+    *,
+    freq_ghz: str,
+    az: Annotated[str, _TEXT] = "0",
+    el: Annotated[str, _TEXT] = "0",
+    pol: str = "VV",
+    distance_m: float | None = None,
+    max_bounces: int = 3,
+    rays_per_wavelength: float | None = None,
+    bistatic: Annotated[str | None, _TEXT] = None,
+    material: str = "metal",
+    permittivity: str | None = None,
+    mesh_frame: str = "ros_z_up",
+    units: str = "m",
+    manifest: Annotated[Path | None, Parameter(name=["--manifest", "--resolve"])] = None,
+    converge: Annotated[bool, Parameter(negative=())] = False,
+    target_error_db: float | None = None,
+    window_deg: float | None = None,
+    plan: Annotated[bool, Parameter(negative=())] = False,
+    yes: Annotated[bool, Parameter(negative=())] = False,
+    max_seconds: float = _MAX_SECONDS,
+    output: Output = None,
+    overwrite: Overwrite = False,
+    seed: int = 0,
+    backend: Literal["auto", "cuda", "llvm", "scalar"] = "auto",
+    pictures: Annotated[bool, Parameter(help="Draw the pictures.")] = True,
+    json_: Json = False,
+) -> int:
+    """Compute the radar cross section of one target over frequency, elevation and azimuth.
+
+    Parameters
+    ----------
+    target
+        A shape (plate:0.1x0.1, sphere:r=0.1, trihedral:triangular,a=0.1, car ...) or a mesh file.
+    freq_ghz
+        Frequencies, as a list 24,77 or START:STOP:STEP with STOP included.
+    az
+        Azimuth of the radar seen from the target in deg, 0 = +x (nose), positive to the left: -40:40:0.5.
+    el
+        Elevation of the radar in deg, positive up.
+    pol
+        Polarisations, receive letter first: VV,HH,HV,VH.
+    distance_m
+        Distance of the radar from the target's origin: apparent RCS by spherical waves. Default: far field.
+    max_bounces
+        Surfaces along a path, 1 to 10.
+    rays_per_wavelength
+        Of the coarsest cells. Default: as sweep_rcs.
+    bistatic
+        AZ,EL of a transmitter that stays; az and el are then the receiver's.
+    material
+        Name in the material table, or parts: as the parts of the mesh say.
+    permittivity
+        eps'-eps''j of an opaque body, as 3.2-0.05j or 3.2,0.05, in place of the material.
+    mesh_frame
+        Axes of a mesh file, for example carla_exporter.
+    units
+        Of a mesh file: m, cm, mm, inch, or metres per unit.
+    manifest
+        Sidecar YAML of tags and materials, for --material parts.
+    converge
+        Sweep again at twice the density of rays, and say what the difference is.
+    target_error_db
+        Double the density until the median change is at most this, or a limit is reached.
+    window_deg
+        Angular window of median and 10-90 % band. Default: 5, less in a narrow sweep.
+    plan
+        Try a few aspects, print cells, rays, time and memory, and stop.
+    yes
+        Begin however long it takes.
+    max_seconds
+        Longest run that is begun without --yes.
+    seed
+        Of the shift of the lattice of rays.
+    backend
+        Ray tracing backend: auto is cuda, then llvm, then scalar.
+    """
+    from .. import runs
+    from ..turntable.plan import check_plan, plan_sweep
+
+    options = _options(
+        freq_ghz, az, el, pol, distance_m, max_bounces, rays_per_wavelength, bistatic, material, permittivity, seed,
+        backend,
+    )  # fmt: skip
+    _positive(target_error_db=target_error_db, window_deg=window_deg, max_seconds=max_seconds)
+    arguments = options.arguments()
+    if output is not None and not plan:
+        runs.check_target(output, overwrite)
+    name, mesh = load_target(
+        target, mesh_frame=mesh_frame, units=units, parts=options.material is None, manifest=manifest
+    )
+    with progress(1, "trying a few aspects", quiet=json_):
+        planned = cost = plan_sweep(mesh, **arguments)
+        if converge or target_error_db is not None:
+            cost = planned + plan_sweep(mesh, **options.doubled().arguments())
+    if plan:
+        print_json(cost.to_dict()) if json_ else say(f"{name}: {cost}")
+        return 0
+    check_plan(cost, float("inf") if yes else max_seconds)
+    study = Study(converge, target_error_db, None if yes else max_seconds)
+    default = functools.partial(runs.default_folder, _label(name), f"rcs-{_band(arguments['frequency_hz'])}ghz")
+    with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
+        if not json_:
+            say(f"{name}: {cost}")
+        started = clock.perf_counter()
+        sweep, report = _sweep(name, mesh, options, study, planned, quiet=json_)
+        seconds = clock.perf_counter() - started
+        from .rcs_output import show_summary, write_results
+
+        facts = {
+            "target": name, "seconds": seconds, "settings": options.record(), "plan": cost.to_dict(),
+            "convergence": None if report is None else report.to_dict(),
+        }  # fmt: skip
+        source = {"target": _located(target), "mesh_frame": mesh_frame, "units": units, "manifest": manifest}
+        summary = write_results(
+            place.partial, sweep, mesh, facts, source, window_deg=window_deg, report=report, pictures=pictures
+        )
+    if json_:
+        print_json(summary)
+    else:
+        show_summary(summary)
+        say(f"{place.folder}: written, swept in {seconds:.1f} s, {summary['backend']} backend")
+    return 0
+
+
+@dataclass(frozen=True)
+class Study:
+    """Whether and how far to refine."""
+
+    converge: bool
+    target_error_db: float | None
+    max_seconds: float | None
+
+
+def _options(
+    freq_ghz: str,
+    az: str,
+    el: str,
+    pol: str,
+    distance_m: float | None,
+    max_bounces: int,
+    rays_per_wavelength: float | None,
+    bistatic: str | None,
+    material: str,
+    permittivity: str | None,
+    seed: int,
+    backend: str,
+) -> RcsOptions:
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
+    return RcsOptions(
+        freq_ghz=freq_ghz,
+        az=az,
+        el=el,
+        polarization=tuple(word.strip().upper() for word in pol.split(",")),
+        distance_m=distance_m,
+        max_bounces=max_bounces,
+        rays_per_wavelength=rays_per_wavelength,
+        bistatic=None if bistatic is None else read_pair("bistatic", bistatic),
+        material=None if material == PARTS else material,
+        permittivity=None if permittivity is None else read_permittivity(permittivity),
+        seed=seed,
+        backend=backend,
+    )
+
+
+def _positive(**options: float | None) -> None:
+    for name, value in options.items():
+        if value is not None and not value > 0.0:
+            raise InputError(f"--{name.replace('_', '-')} {value:g}: more than 0 is needed")
+
+
+def _sweep(
+    name: str, mesh: TaggedMesh, options: RcsOptions, study: Study, planned: SweepPlan, *, quiet: bool
+) -> tuple[RcsSweep, Convergence | None]:
+    """Return the (finest) sweep, and the report where densities are compared."""
+    from ..rcs import sweep_rcs
+    from ..turntable.convergence import converge
+
+    if not (study.converge or study.target_error_db is not None):
+        with _timed(planned.seconds, "sweeping", quiet=quiet):
+            return replace(sweep_rcs(mesh, **options.arguments()), target=name), None
+    with _timed(planned.seconds, "sweeping", quiet=quiet) as now:
+
+        def before(density: float, expected: float | None) -> None:
+            now.restart(expected or planned.seconds, f"{density:g} rays per wavelength")
+
+        report = converge(
+            mesh, target_error_db=study.target_error_db, max_seconds=study.max_seconds, before=before,
+            **options.arguments(),
+        )  # fmt: skip
+    return replace(report.finest, target=name), report
+
+
+@dataclass
+class _Clock:
+    """What a bar is filling towards: seconds that are expected, since when, and for what."""
+
+    expected: float
+    what: str
+    since: float = field(default_factory=clock.perf_counter)
+
+    def restart(self, expected: float, what: str) -> None:
+        """Begin a next part."""
+        self.expected, self.what, self.since = expected, what, clock.perf_counter()
+
+
+@contextmanager
+def _timed(expected: float, what: str, *, quiet: bool) -> Iterator[_Clock]:
+    """Show a bar that fills with the share of the planned time: a sweep is one call, and says nothing on the way."""
+    now = _Clock(expected, what)
+    done = threading.Event()
+    with progress(100, what, quiet=quiet) as step:
+
+        def tick() -> None:
+            shown = 0
+            while not done.wait(0.25):
+                elapsed = clock.perf_counter() - now.since
+                share = min(99, int(100 * elapsed / max(now.expected, 1e-3)))
+                step(f"{now.what}, % of the planned {now.expected:.0f} s", advance=share - shown)
+                shown = share
+
+        ticker = threading.Thread(target=tick, daemon=True)
+        ticker.start()
+        try:
+            yield now
+        finally:
+            done.set()
+            ticker.join()
+
+
+def _label(name: str) -> str:
+    """Return a name for a folder: ``plate-0.05x0.05`` of ``plate:0.05x0.05``."""
+    return re.sub(r"[^\w.]+", "-", Path(name).stem if "/" in name else name).strip("-")
+
+
+def _band(frequency_hz: list[float]) -> str:
+    ends = sorted({f"{f / 1e9:g}" for f in (min(frequency_hz), max(frequency_hz))}, key=float)
+    return "-".join(ends)
+
+
+def _located(target: str) -> str:
+    file = Path(target)
+    return str(file.resolve()) if file.is_file() else target
