@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from shenron_rt.physics import box_amplitude
 from shenron_rt.scene.mesh import TaggedMesh, build_mesh
 from shenron_rt.scene.shapes import make_shape
 
-from .bars import Bar, Cut, Limit, Run
-from .tables import columns, rows
+from .bars import Bar, Cut, Limit, Run, dbsm
+from .tables import columns, rows, wavelength
 
 INCH = 0.0254
 #: Closed camera box: corners (x, z) and depth along y, in its length of 0.4 m.
@@ -76,10 +77,11 @@ def target(name: str, shared: Path) -> Any:
 
 
 def reference_rows(run: Run, name: str, kind: str, ghz: float, pol: str) -> dict[str, np.ndarray]:
-    """Return a curve of the suite's tables, thinned in quick runs."""
+    """Return a curve of the suite's tables, without the plate's edge: physical optics has nothing there."""
     table = columns(run.shared / f"reference/emcc/{TABLES[name]}.csv")
     curve = rows(table, kind=kind, freq_ghz=ghz, pol=pol)
-    return {key: column[run.thin(4)] for key, column in curve.items()}
+    keep = curve["phi_deg"] != 90.0 if name == "IIA" else slice(None)
+    return {key: column[keep] for key, column in curve.items()}
 
 
 def against(run: Run, name: str, kind: str, ghz: float, pol: str, bounces: int = 1) -> list[Cut]:
@@ -106,6 +108,15 @@ def score(name: str, ghz: float, pol: str, shared: Path) -> list[Limit]:
     return [Limit("mean", round(float(row[f"mae_{n}"][0]) + 0.1, 2), float(n)) for n in (10, 20, 30)]
 
 
+def thin_plate_score(ghz: float, pol: str, shared: Path) -> list[Limit]:
+    """Return the same for the plate of finite thickness, which the suite's own table of scores leaves out."""
+    curve = reference_rows(Run(shared), "IIB", "ref", ghz, pol)
+    size = (0.064 * INCH, 10.5 * INCH, 6 * INCH)
+    po = dbsm(box_amplitude(*size, wavelength(ghz), np.radians(curve["phi_deg"])))
+    cut = [Cut(po, curve["rcs_dbsm"])]
+    return [Limit("mean", round(Limit("mean", None, n).value(cut) + 0.1, 2), n) for n in (10.0, 20.0)]
+
+
 def sector_medians(run: Run, kind: str, ghz: float, pol: str) -> list[Cut]:
     """Compare medians over sectors of 15 degrees of the ducted box, eight bounces."""
     (cut,) = against(run, "IIISB", kind, ghz, pol, bounces=8)
@@ -127,8 +138,7 @@ BARS = (
           functools.partial(score, name, ghz, pol)) for name, ghz, pol in SCORED),
     *(Bar(f"IIB-{ghz:g}-{pol}", f"thin plate IIB, {ghz:g} GHz, {POLARIZATION[pol]}", "full wave (MoM)",
           functools.partial(against, name="IIB", kind="ref", ghz=ghz, pol=pol),
-          lambda shared, g=score_ghz, p=pol: score("IIA", g, p, shared)[:2])
-      for ghz, score_ghz in ((5.12, 5.12), (7.0, 7.0), (10.24, 10.2)) for pol in "VH"),
+          functools.partial(thin_plate_score, ghz, pol)) for ghz in (5.12, 7.0, 10.24) for pol in "VH"),
     *(Bar(f"IIB-measured-{ghz:g}-{pol}", f"thin plate IIB, {ghz:g} GHz, {POLARIZATION[pol]}", "measurement",
           functools.partial(against, name="IIB", kind="meas_m1", ghz=ghz, pol=pol), (Limit("mean", None, 20.0),))
       for ghz in (10.24,) for pol in "VH"),
