@@ -49,7 +49,7 @@ def exact_matrix(kind: str, leg: float, lam: float, azimuth: FloatArray, elevati
 def dihedral(run: Run, ghz: float, prefix: str) -> list[Cut]:
     """Compare the cut across the seam, VV and HH, with columns of the table."""
     table = columns(run.shared / f"reference/rcs/dihedral_100x100x100mm_{ghz:g}GHz.csv")
-    part = run.thin(4)
+    part = run.thin(6)
     angle = table["phi_deg"][part] - 45.0
     got = run.sweep(DIHEDRAL, frequency_hz=ghz * 1e9, azimuth_deg=angle, polarization=("VV", "HH"))
     middle = int(np.abs(angle).argmin())
@@ -73,20 +73,20 @@ def error_table(name: str, extra_db: float, shared: Path) -> list[Limit]:
     return [Limit("mean", round(float(table[f"mae_{n}"].max()) + extra_db, 2), float(n)) for n in (10, 20, 30)]
 
 
-def table_cuts(run: Run, name: str, columns_of: Callable[[str], str], cross: bool) -> list[Cut]:
+def table_cuts(run: Run, name: str, column_of: Callable[[str], str], cross: bool) -> list[Cut]:
     """Compare both cuts of a trihedral's table, co- or cross-polar."""
     kind, _, ghz = name.split("_")
     cuts = []
     for cut, axis in (("az", "az_deg"), ("el", "el_deg")):
         table = columns(run.shared / f"reference/rcs/trihedral_{name}_{cut}.csv")
-        table = {key: column[run.thin(5)] for key, column in table.items()}
+        table = {key: column[run.thin(9)] for key, column in table.items()}
         pols = ("HV",) if cross else ("VV", "HH")
         got = run.sweep(
             in_table_frame(kind, CUTS[name]), frequency_hz=float(ghz[:-3]) * 1e9,
             azimuth_deg=np.unique(table["az_deg"]), elevation_deg=np.unique(table["el_deg"]), polarization=pols,
         ).rcs_dbsm  # fmt: skip
         middle = int(np.abs(table[axis] - (45.0 if cut == "az" else TILT_DEG)).argmin())
-        cuts += [Cut(got[0, :, :, n].ravel(), table[columns_of(p)], middle) for n, p in enumerate(pols)]
+        cuts += [Cut(got[0, :, :, n].ravel(), table[column_of(p)], middle) for n, p in enumerate(pols)]
     return [c for c in cuts if c.want.max() > -110.0]  # the cut through the plane of symmetry has no cross-polar echo
 
 
@@ -152,9 +152,9 @@ BARS = (
         functools.partial(dihedral, ghz=24.0, prefix="mom2d"),
         functools.partial(error_table, "dihedral_100x100x100mm_24GHz", 0.1)),
     *(Bar(f"trihedral-{name}", f"trihedral {name.replace('_', ', ')}, both cuts, VV and HH", "exact 1+2+3 bounces",
-          functools.partial(table_cuts, name=name, columns_of=co, cross=False), OWN_TRIHEDRAL) for name in CUTS),
+          functools.partial(table_cuts, name=name, column_of=co, cross=False), OWN_TRIHEDRAL) for name in CUTS),
     *(Bar(f"trihedral-cross-{name}", f"trihedral {name.replace('_', ', ')}, HV", "exact 1+2+3 bounces",
-          functools.partial(table_cuts, name=name, columns_of=cross, cross=True), (Limit("mean", 0.1, 15.0),))
+          functools.partial(table_cuts, name=name, column_of=cross, cross=True), (Limit("mean", 0.1, 15.0),))
       for name in CUTS),
     *(Bar(f"octant-{kind}-{ghz:g}", f"{kind} trihedral, {ghz:g} GHz, boresight and random directions, VV and HH",
           "exact 1+2+3 bounces", functools.partial(random_directions, kind=kind, ghz=ghz, cross=False), OWN_TRIHEDRAL,

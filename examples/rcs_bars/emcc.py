@@ -135,10 +135,10 @@ BARS = (
       for name, ghz, most in (("IIA", 5.12, 0.1), ("IIA", 10.2, 0.1), ("IIISA", 5.12, 0.2), ("IIISA", 7.0, 0.2))),
     *(Bar(f"{name}-{ghz:g}-{pol}", f"{NAMES[name]}, {ghz:g} GHz, {POLARIZATION[pol]}", "full wave (MoM)",
           functools.partial(against, name=name, kind="ref", ghz=ghz, pol=pol),
-          functools.partial(score, name, ghz, pol)) for name, ghz, pol in SCORED),
+          functools.partial(score, name, ghz, pol), slow=ghz < 7.0) for name, ghz, pol in SCORED),
     *(Bar(f"IIB-{ghz:g}-{pol}", f"thin plate IIB, {ghz:g} GHz, {POLARIZATION[pol]}", "full wave (MoM)",
           functools.partial(against, name="IIB", kind="ref", ghz=ghz, pol=pol),
-          functools.partial(thin_plate_score, ghz, pol)) for ghz in (5.12, 7.0, 10.24) for pol in "VH"),
+          functools.partial(thin_plate_score, ghz, pol), slow=ghz < 8.0) for ghz in (5.12, 7.0, 10.24) for pol in "VH"),
     *(Bar(f"IIB-measured-{ghz:g}-{pol}", f"thin plate IIB, {ghz:g} GHz, {POLARIZATION[pol]}", "measurement",
           functools.partial(against, name="IIB", kind="meas_m1", ghz=ghz, pol=pol), (Limit("mean", None, 20.0),))
       for ghz in (10.24,) for pol in "VH"),

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from shenron_rt._typing import FloatArray, IntArray
 from shenron_rt.frames import Pose
 from shenron_rt.physics import plate_rcs
 from shenron_rt.scene.mesh import TaggedMesh
@@ -30,27 +31,37 @@ def turned_plate(a: float, b: float, phi_deg: float) -> TaggedMesh:
     return make_shape(f"plate:{a}x{b}").transformed(Pose(ypr_deg=(0.0, 0.0, -phi_deg)))
 
 
+def high_samples(run: Run, want: FloatArray, within_db: float, step: int) -> IntArray:
+    """Return the samples that a bar counts, every ``step``-th in quick runs."""
+    return np.flatnonzero(want >= want.max() - within_db)[run.thin(step)]
+
+
 def plate_cuts(run: Run, name: str) -> list[Cut]:
     """Compare all cuts of a plate with physical optics."""
-    a, b, ghz, cuts = PLATES[name]
+    a, b, ghz, angles = PLATES[name]
     table = columns(run.shared / f"reference/rcs/plate_{name}.csv")
-    part = run.thin(8)
-    return [
-        Cut(
-            run.sweep(turned_plate(a, b, phi), frequency_hz=ghz * 1e9, azimuth_deg=table["theta_deg"][part],
-                      max_bounces=1).rcs_dbsm[0, 0, :, 0],
-            table[f"po_{column}_dbsm"][part],
+    cuts = []
+    for column, phi in angles.items():
+        want = table[f"po_{column}_dbsm"]
+        part = high_samples(run, want, 30.0, 4)
+        got = run.sweep(
+            turned_plate(a, b, phi), frequency_hz=ghz * 1e9, azimuth_deg=table["theta_deg"][part], max_bounces=1
         )
-        for column, phi in cuts.items()
-    ]  # fmt: skip
+        cuts.append(Cut(got.rcs_dbsm[0, 0, :, 0], want[part]))
+    return cuts
 
 
 def plate_full_wave(run: Run, ghz: float) -> list[Cut]:
     """Compare the cut along one side with the method of moments, E across and along it."""
     table = columns(run.shared / f"reference/rcs/plate_100x100mm_{ghz:g}GHz.csv")
-    part = run.thin(5)
-    got = run.sweep("plate:0.1x0.1", frequency_hz=ghz * 1e9, azimuth_deg=table["theta_deg"][part], max_bounces=1)
-    return [Cut(got.rcs_dbsm[0, 0, :, 0], table[f"mom2d_phi0_{e}_dbsm"][part]) for e in ("Eperp", "Epar")]
+    cuts = []
+    for e in ("Eperp", "Epar"):
+        want = table[f"mom2d_phi0_{e}_dbsm"]
+        part = high_samples(run, want, 40.0, 5)
+        angle = table["theta_deg"][part]
+        got = run.sweep("plate:0.1x0.1", frequency_hz=ghz * 1e9, azimuth_deg=angle, max_bounces=1)
+        cuts.append(Cut(got.rcs_dbsm[0, 0, :, 0], want[part]))
+    return cuts
 
 
 def nulls(run: Run, shape: str, ghz: float, sine: np.ndarray) -> list[Cut]:
@@ -78,7 +89,7 @@ def disc_nulls(run: Run) -> list[Cut]:
 def disc_cut(run: Run) -> list[Cut]:
     """Compare a disc with its Airy pattern."""
     table = columns(run.shared / "reference/rcs/disc_r50mm_77GHz.csv")
-    part = run.thin(8)
+    part = high_samples(run, table["po_dbsm"], 30.0, 3)
     got = run.sweep("disc:r=0.05", frequency_hz=77e9, azimuth_deg=table["theta_deg"][part], max_bounces=1)
     return [Cut(got.rcs_dbsm[0, 0, :, 0], table["po_dbsm"][part])]
 
@@ -88,7 +99,9 @@ def box_cuts(run: Run) -> list[Cut]:
     table = columns(run.shared / "reference/rcs/box_300x200x100mm_77GHz.csv")
     cuts = []
     for elevation in (0.0, 10.0):
-        cut = {key: column[run.thin(2)] for key, column in rows(table, el_deg=elevation).items()}
+        cut = rows(table, el_deg=elevation)
+        part = high_samples(run, cut["po_dbsm"], 30.0, 2)
+        cut = {key: column[part] for key, column in cut.items()}
         got = run.sweep(
             "box:0.3x0.2x0.1", frequency_hz=77e9, azimuth_deg=cut["az_deg"], elevation_deg=elevation, max_bounces=1
         )
