@@ -12,9 +12,10 @@ import logging
 import sys
 from pathlib import Path
 
-import shenron_rt as srt
 from rcs_bars.bars import Bar, Figure
 from rcs_bars.tables import shared_folder
+
+import shenron_rt as srt
 
 PAGE = Path(__file__).resolve().parents[1] / "docs/rcs-validation.md"
 GROUPS = {

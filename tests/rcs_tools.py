@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
-
-from rcs_bars.bars import Bar  # noqa: E402 - examples is no package
+from rcs_bars.bars import Bar
 
 
 def gated(module: ModuleType, *, slow: bool) -> list[object]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from rcs_tools import Bar, gated, hold
-
 from rcs_bars import dielectric
+from rcs_tools import Bar, gated, hold
 
 
 @pytest.mark.parametrize("bar", gated(dielectric, slow=False))

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 import shenron_rt as srt
-from shenron_rt._typing import FloatArray
+from shenron_rt._typing import BoolArray, FloatArray
 from shenron_rt.rcs import DEFAULT_RAYS_PER_WAVELENGTH
 
 #: mean, max: of |error|; at: |error| of one sample, the peak or boresight; median: error of the median level; highest:
@@ -56,14 +56,11 @@ class Cut:
     want: FloatArray
     at: int = 0
 
-    def kept(self, within_db: float | None) -> NDArrayBool:
+    def kept(self, within_db: float | None) -> BoolArray:
         """Return which samples count: those whose reference lies within so much of its peak."""
         if within_db is None:
             return np.ones(len(self.want), dtype=bool)
         return np.asarray(self.want >= self.want.max() - within_db)
-
-
-NDArrayBool = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,9 @@ class Limit:
         moved = [Cut(f.got, c.got, c.at) for c, f in zip(cuts, finer, strict=True)]
         if self.statistic in ("median", "at"):
             return self.value(moved)
-        change = np.concatenate([np.abs(m.got - m.want)[c.kept(self.within_db)] for c, m in zip(cuts, moved)])
+        change = np.concatenate(
+            [np.abs(m.got - m.want)[c.kept(self.within_db)] for c, m in zip(cuts, moved, strict=True)]
+        )
         return float(change.mean() if self.statistic == "mean" else change.max())
 
 

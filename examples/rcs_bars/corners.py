@@ -53,7 +53,9 @@ def dihedral(run: Run, ghz: float, prefix: str) -> list[Cut]:
     angle = table["phi_deg"][part] - 45.0
     got = run.sweep(DIHEDRAL, frequency_hz=ghz * 1e9, azimuth_deg=angle, polarization=("VV", "HH"))
     middle = int(np.abs(angle).argmin())
-    return [Cut(got.rcs_dbsm[0, 0, :, n], table[f"{prefix}_{p}_dbsm"][part], middle) for n, p in enumerate(("VV", "HH"))]
+    return [
+        Cut(got.rcs_dbsm[0, 0, :, n], table[f"{prefix}_{p}_dbsm"][part], middle) for n, p in enumerate(("VV", "HH"))
+    ]
 
 
 def dihedral_sign(run: Run) -> list[Cut]:

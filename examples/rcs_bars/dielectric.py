@@ -90,6 +90,6 @@ BARS = (
     *(Bar(f"opaque-{m}", f"plate 0.1 m of opaque {m}, 77 GHz, VV and HH", "PO x |R(angle)|",
           functools.partial(plate_cut, material=m), (Limit("at", 0.1), Limit("mean", 0.1, 30.0)), needs=None)
       for m in OPAQUE),
-    *(Bar(f"mirror-{m}", f"the same, bistatic, mirror direction at 5 to 75 deg", "2 sqrt(pi) A cos |R|/lambda",
+    *(Bar(f"mirror-{m}", "the same, bistatic, mirror direction at 5 to 75 deg", "2 sqrt(pi) A cos |R|/lambda",
           functools.partial(mirror, material=m), (Limit("max", 0.1),), needs=None) for m in ("concrete", "glass")),
 )  # fmt: skip

@@ -128,7 +128,12 @@ def wall(run: Run, reference: str) -> list[Cut]:
         ]
     )
     if reference == "plate":
-        return [Cut(got, np.array([10.0 * math.log10(near_range_plate_rcs(5.0, 5.0, wavelength(24.0), r)) for r in distance]))]
+        return [
+            Cut(
+                got,
+                np.array([10.0 * math.log10(near_range_plate_rcs(5.0, 5.0, wavelength(24.0), r)) for r in distance]),
+            )
+        ]
     over = got - 10.0 * np.log10(infinite_plate_rcs(distance))
     return [Cut(np.array([10.0 * math.log10(np.mean(10.0 ** (over / 10.0)))]), np.zeros(1))]
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shenron_rt._typing import FloatArray
 from shenron_rt.constants import SPEED_OF_LIGHT
 
 
@@ -44,8 +43,3 @@ def rows(table: dict[str, np.ndarray], **equal: str | float) -> dict[str, np.nda
 def wavelength(ghz: float) -> float:
     """Return the wavelength [m]."""
     return SPEED_OF_LIGHT / (ghz * 1e9)
-
-
-def within(table: FloatArray, low: float, high: float) -> np.ndarray:
-    """Return which values lie from low to high."""
-    return (table >= low) & (table <= high)
