@@ -1,4 +1,4 @@
-"""Measure the error tables of docs/rcs-validation.md: ``python examples/rcs_validation.py``; ``--write`` puts them there.
+"""Measure the tables of docs/rcs-validation.md: ``python examples/rcs_validation.py``; ``--write`` puts them there.
 
 ``--quick`` takes a subset of the samples (a minute), ``--only NAME`` one group. Needs the reference tables beside the
 checkout, or where SHENRON_RT_SHARED says. All of it takes about twenty minutes on two cores, most of it the vehicles.

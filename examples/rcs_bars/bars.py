@@ -97,9 +97,8 @@ class Limit:
         moved = [Cut(f.got, c.got, c.at) for c, f in zip(cuts, finer, strict=True)]
         if self.statistic in ("median", "at"):
             return self.value(moved)
-        change = np.concatenate(
-            [np.abs(m.got - m.want)[c.kept(self.within_db)] for c, m in zip(cuts, moved, strict=True)]
-        )
+        kept = [c.kept(self.within_db) for c in cuts]
+        change = np.concatenate([np.abs(m.got - m.want)[k] for k, m in zip(kept, moved, strict=True)])
         return float(change.mean() if self.statistic == "mean" else change.max())
 
 

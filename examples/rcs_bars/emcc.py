@@ -33,7 +33,7 @@ def camera_box() -> TaggedMesh:
     """Return the convex polyhedron of problem IIISA: a hexagon in the x-z plane drawn out along y."""
     n = len(HEXAGON)
     near = np.column_stack([HEXAGON[:, 0], np.full(n, -0.5 * DEPTH), HEXAGON[:, 1]])
-    vertices = BOX_LENGTH * np.concatenate([near, near + [0.0, DEPTH, 0.0]])
+    vertices = BOX_LENGTH * np.concatenate([near, near + np.array([0.0, DEPTH, 0.0])])
     i, j = np.arange(n), (np.arange(n) + 1) % n
     sides = np.concatenate([np.stack([i, j, j + n], axis=1), np.stack([i, j + n, i + n], axis=1)])
     fan = np.stack([np.zeros(n - 2, dtype=int), np.arange(1, n - 1), np.arange(2, n)], axis=1)
@@ -150,6 +150,6 @@ BARS = (
     *(Bar(f"IIIA-measured-{pol}", f"almond IIIA, 10.25 GHz, {POLARIZATION[pol]}", "measurement",
           functools.partial(against, name="IIIA", kind="meas_m1", ghz=10.25, pol=pol), (Limit("mean", None, 20.0),))
       for pol in "VH"),
-    *(Bar(f"IIISB-measured-{pol}", f"ducted box IIISB, 10.24 GHz, {POLARIZATION[pol]}, medians of 15 deg", "measurement",
-          functools.partial(sector_medians, kind="meas", ghz=10.24, pol=pol), (Limit("mean", None),)) for pol in "VH"),
+    *(Bar(f"IIISB-measured-{pol}", f"ducted box IIISB, 10.24 GHz, {POLARIZATION[pol]}, medians of 15 deg",
+          "measurement", functools.partial(sector_medians, kind="meas", ghz=10.24, pol=pol), (Limit("mean", None),)) for pol in "VH"),
 )  # fmt: skip

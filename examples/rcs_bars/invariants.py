@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+import shenron_rt as srt
 from shenron_rt.frames import Pose
 from shenron_rt.physics import plate_scattering_matrix
+from shenron_rt.rcs import DEFAULT_RAYS_PER_WAVELENGTH
 from shenron_rt.scene.mesh import TaggedMesh, build_mesh, concatenate
 from shenron_rt.scene.readers import read_mesh
 from shenron_rt.scene.shapes import make_shape
@@ -37,8 +39,8 @@ def cross_channels(run: Run, kind: str, ghz: float) -> list[Cut]:
 def exchange(run: Run, reference: str) -> list[Cut]:
     """Swap transmitter and receiver of a bistatic plate, off its mirror direction.
 
-    Physical optics is not reciprocal there: what it radiates carries the cosine of incidence, not that of departure. The
-    two results differ by what the exact integral says they do.
+    Physical optics is not reciprocal there: what it radiates carries the cosine of incidence, not that of departure.
+    The two results differ by what the exact integral says they do.
     """
     ways = ((LIT_DEG, SEEN_DEG), (SEEN_DEG, LIT_DEG))
     got, want = [], []
@@ -93,16 +95,16 @@ def vehicle(name: str, shared: Path) -> TaggedMesh:
     return mesh.transformed(Pose(tuple(-mesh.bounds.mean(axis=0))))
 
 
-def vehicle_median(run: Run, name: str, ghz: float, split_too: bool = False) -> list[Cut]:
-    """Return the median level round the circle; its change under halved spacing, or splitting, is the result."""
-    azimuth = np.arange(0.5, 360.0, 60.0 if run.quick else 10.0)
+def vehicle_median(run: Run, name: str, density: float | None, step_deg: float) -> list[Cut]:
+    """Compare levels round the circle with those at another density of rays, or without one on the mesh cut in four."""
     mesh = vehicle(name, run.shared)
-    options = {"frequency_hz": ghz * 1e9, "azimuth_deg": azimuth}
-    got = run.sweep(split_in_four(mesh) if split_too else mesh, **options).rcs_dbsm[0, 0, :, 0]
-    if split_too:
-        return [Cut(got, run.sweep(mesh, **options).rcs_dbsm[0, 0, :, 0])]
-    finer = Run(run.shared, run.quick, finer=True).sweep(mesh, **options).rcs_dbsm[0, 0, :, 0]
-    return [Cut(got, finer)]
+    options = {"frequency_hz": 77e9, "azimuth_deg": np.arange(0.5, 360.0, 60.0 if run.quick else step_deg)}
+    got = srt.sweep_rcs(mesh, **options)
+    if density is None:
+        other = srt.sweep_rcs(split_in_four(mesh), **options)
+    else:
+        other = srt.sweep_rcs(mesh, **options, rays_per_wavelength=density)
+    return [Cut(got.rcs_dbsm[0, 0, :, 0], other.rcs_dbsm[0, 0, :, 0])]
 
 
 BARS = (
@@ -115,12 +117,16 @@ BARS = (
         functools.partial(exchange, reference="other way"), (Limit("max", None),), needs=None),
     *(Bar(f"split-{shape.split(':')[0]}", f"{shape}, {ghz:g} GHz, each triangle cut in four", "uncut mesh",
           functools.partial(split, shape=shape, ghz=ghz), (Limit("max", 0.1, steady=False),), needs=None)
-      for shape, ghz in (("trihedral:square,a=0.05", 77.0), ("dihedral:a=0.1,b=0.1,h=0.1", 24.0), ("box:0.3x0.2x0.1", 24.0),
-                         ("cylinder:r=0.05,l=0.1", 77.0))),
-    *(Bar(f"median-{name}", f"{name}, 77 GHz, 3 bounces, median over the circle", "half the ray spacing",
-          functools.partial(vehicle_median, name=name, ghz=77.0), (Limit("median", 0.3),), rays=False, slow=True,
-          needs="data") for name in ("sedan", "truck", "pedestrian")),
-    Bar("split-sedan", "sedan, 77 GHz, median, each triangle cut in four", "uncut mesh",
-        functools.partial(vehicle_median, name="sedan", ghz=77.0, split_too=True), (Limit("median", 0.1),), rays=False,
+      for shape, ghz in (("trihedral:square,a=0.05", 77.0), ("dihedral:a=0.1,b=0.1,h=0.1", 24.0),
+                         ("box:0.3x0.2x0.1", 24.0), ("cylinder:r=0.05,l=0.1", 77.0))),
+    *(Bar(f"median-{name}", f"{name}, 77 GHz, 3 bounces, median over {360 / step:g} aspects", "half the ray spacing",
+          functools.partial(vehicle_median, name=name, density=2.0 * DEFAULT_RAYS_PER_WAVELENGTH, step_deg=step),
+          (Limit("median", 0.3),), rays=False, slow=True, needs="data")
+      for name, step in (("sedan", 10.0), ("truck", 30.0), ("pedestrian", 10.0))),
+    Bar("median-sedan-10", "sedan, 77 GHz, 3 bounces, median over 12 aspects", "10 rays per wavelength",
+        functools.partial(vehicle_median, name="sedan", density=10.0, step_deg=30.0), (Limit("median", 1.0),), rays=False,
+        slow=True, needs="data"),
+    Bar("split-sedan", "sedan, 77 GHz, 3 bounces, median over 36 aspects, each triangle cut in four", "uncut mesh",
+        functools.partial(vehicle_median, name="sedan", density=None, step_deg=10.0), (Limit("median", 0.1),), rays=False,
         slow=True, needs="data"),
 )  # fmt: skip
