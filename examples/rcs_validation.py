@@ -82,8 +82,8 @@ def main() -> None:
         print(text)
         begin, end = f"<!-- {group} -->\n", f"<!-- end of {group} -->"
         page = page[: page.index(begin) + len(begin)] + text + page[page.index(end) :]
-    if arguments.write:
-        PAGE.write_text(page, encoding="utf-8")
+        if arguments.write:
+            PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -75,6 +75,17 @@ def error_table(name: str, extra_db: float, shared: Path) -> list[Limit]:
     return [Limit("mean", round(float(table[f"mae_{n}"].max()) + extra_db, 2), float(n)) for n in (10, 20, 30)]
 
 
+def along(
+    run: Run, mesh: TaggedMesh, ghz: float, table: dict[str, np.ndarray], polarization: tuple[str, ...]
+) -> FloatArray:
+    """Return (rows, polarisations) levels in the directions of a cut, one of whose angles is the same throughout."""
+    (azimuth, column), (elevation, line) = (np.unique(table[a], return_inverse=True) for a in ("az_deg", "el_deg"))
+    got = run.sweep(
+        mesh, frequency_hz=ghz * 1e9, azimuth_deg=azimuth, elevation_deg=elevation, polarization=polarization
+    )
+    return np.asarray(got.rcs_dbsm[0][line, column])
+
+
 def table_cuts(run: Run, name: str, column_of: Callable[[str], str], cross: bool) -> list[Cut]:
     """Compare both cuts of a trihedral's table, co- or cross-polar."""
     kind, _, ghz = name.split("_")
@@ -83,12 +94,9 @@ def table_cuts(run: Run, name: str, column_of: Callable[[str], str], cross: bool
         table = columns(run.shared / f"reference/rcs/trihedral_{name}_{cut}.csv")
         table = {key: column[run.thin(9)] for key, column in table.items()}
         pols = ("HV",) if cross else ("VV", "HH")
-        got = run.sweep(
-            in_table_frame(kind, CUTS[name]), frequency_hz=float(ghz[:-3]) * 1e9,
-            azimuth_deg=np.unique(table["az_deg"]), elevation_deg=np.unique(table["el_deg"]), polarization=pols,
-        ).rcs_dbsm  # fmt: skip
+        got = along(run, in_table_frame(kind, CUTS[name]), float(ghz[:-3]), table, pols)
         middle = int(np.abs(table[axis] - (45.0 if cut == "az" else TILT_DEG)).argmin())
-        cuts += [Cut(got[0, :, :, n].ravel(), table[column_of(p)], middle) for n, p in enumerate(pols)]
+        cuts += [Cut(got[:, n], table[column_of(p)], middle) for n, p in enumerate(pols)]
     return [c for c in cuts if c.want.max() > -110.0]  # the cut through the plane of symmetry has no cross-polar echo
 
 
@@ -120,12 +128,9 @@ def full_wave(run: Run, lambdas: int, boresight: bool) -> list[Cut]:
         off = np.abs(near[axis] - middle)
         keep = off < (0.3 if boresight else 20.0)
         near = {key: column[keep][run.thin(4)] for key, column in near.items()}
-        got = run.sweep(
-            mesh, frequency_hz=77e9, azimuth_deg=np.unique(near["az_deg"]), elevation_deg=np.unique(near["el_deg"]),
-            polarization=("VV", "HH"),
-        ).rcs_dbsm - 20.0 * math.log10(lam)  # fmt: skip
+        got = along(run, mesh, 77.0, near, ("VV", "HH")) - 20.0 * math.log10(lam)
         at = int(np.abs(near[axis] - middle).argmin())
-        cuts += [Cut(got[0, :, :, n].ravel(), near[f"mom_{p}_db"], at) for n, p in enumerate(("VV", "HH"))]
+        cuts += [Cut(got[:, n], near[f"mom_{p}_db"], at) for n, p in enumerate(("VV", "HH"))]
     return cuts
 
 

@@ -116,7 +116,8 @@ def cylinder(run: Run, reference: str) -> list[Cut]:
 
 
 BARS = (
-    *(Bar(f"sphere-{1e3 * r:g}mm", f"sphere r = {1e3 * r:g} mm, 76.5-79 GHz (ka {ka} and more)", "PO of the lit half", functools.partial(sphere, radius=r, reference="po"), (Limit("max", 0.1),), needs=None)
+    *(Bar(f"sphere-{1e3 * r:g}mm", f"sphere r = {1e3 * r:g} mm, 76.5-79 GHz (ka {ka} and more)", "PO of the lit half",
+          functools.partial(sphere, radius=r, reference="po"), (Limit("max", 0.1),), needs=None)
       for r, ka in ((0.0625, 100), (0.1, 160))),
     *(Bar(f"sphere-{1e3 * r:g}mm-mie", f"sphere r = {1e3 * r:g} mm, 76.5-79 GHz", "Mie",
           functools.partial(sphere, radius=r, reference="mie"), (Limit("max", 0.3),), needs=None)

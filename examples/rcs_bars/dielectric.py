@@ -89,7 +89,8 @@ TABLES = "own table, exact"
 BARS = (
     Bar("fresnel", "half-spaces, |R| TE and TM", TABLES, half_space, (Limit("max", 1e-4),), unit="", rays=False),
     Bar("slab", "slabs, |R| and |T| TE and TM", TABLES, slabs, (Limit("max", 1e-4),), unit="", rays=False),
-    Bar("layers", "water films on asphalt, coated metal, |R| TE and TM", TABLES, layers, (Limit("max", 1e-4),), unit="", rays=False),
+    Bar("layers", "water films on asphalt, coated metal, |R| TE and TM", TABLES, layers, (Limit("max", 1e-4),), unit="",
+        rays=False),
     *(Bar(f"opaque-{m}", f"plate 0.1 m of opaque {m}, 77 GHz, VV and HH", "PO x |R(angle)|",
           functools.partial(plate_cut, material=m), (Limit("at", 0.1), Limit("mean", 0.1, 30.0)), needs=None)
       for m in OPAQUE),

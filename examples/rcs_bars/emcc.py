@@ -151,5 +151,6 @@ BARS = (
           functools.partial(against, name="IIIA", kind="meas_m1", ghz=10.25, pol=pol), (Limit("mean", None, 20.0),))
       for pol in "VH"),
     *(Bar(f"IIISB-measured-{pol}", f"ducted box IIISB, 10.24 GHz, {POLARIZATION[pol]}, medians of 15 deg",
-          "measurement", functools.partial(sector_medians, kind="meas", ghz=10.24, pol=pol), (Limit("mean", None),)) for pol in "VH"),
+          "measurement", functools.partial(sector_medians, kind="meas", ghz=10.24, pol=pol), (Limit("mean", None),))
+      for pol in "VH"),
 )  # fmt: skip
