@@ -26,6 +26,7 @@ GROUPS = {
     "near_range": "Near range",
     "emcc": "EMCC targets",
     "invariants": "What must not matter",
+    "vehicles": "Vehicles and a pedestrian",
 }
 HEAD = ("what", "reference", "statistic", "bar", "measured", "finer rays change it by", "holds", "s")
 
