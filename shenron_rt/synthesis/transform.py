@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from .._typing import ComplexArray, FloatArray, IntArray
 from .blocks import Block
 from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
+from .gridding import SPACING, Kernel, series
 
 __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 
@@ -26,10 +28,6 @@ SAMPLED_ECHOES = 160
 COLUMNS = 8192
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
-#: Oversampling of the transform's grid: the wider grid costs less than the wider kernel a smaller one needs.
-UPSAMPLING = 2.0
-#: Loosest accuracy a transform is asked for.
-LOOSEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,12 @@ class Prepared:
     middle, half : (len(used),) float
         Centre and half spread of each [rad].
     form : LowRank
+    centre : (2,) float
+        Of the fast and slow angular frequencies [rad/s].
+    kernels : list of Kernel
+        For every row of the form.
     waves : (R, n_samples) complex
-        The form at the samples of the block, with the phase of the centres.
+        The form at the samples of the block, with the phase of the centres and the correction for the kernel.
     """
 
     accuracy: float
@@ -60,6 +62,8 @@ class Prepared:
     middle: list[float]
     half: list[float]
     form: LowRank
+    centre: tuple[float, float]
+    kernels: list[Kernel]
     waves: ComplexArray
 
     @classmethod
@@ -68,11 +72,12 @@ class Prepared:
         to_tx = moved.range_derivatives(tx_m, 4)
         every = tuple(range(N_RESIDUALS))
         probes = _probes(rx_m)
-        seen = _residuals(block, moved, to_tx, probes[0], every)
+        phases = _phases(block, moved, to_tx, probes[0], every)
+        seen = np.stack(phases.residuals)
         rows = _sample_rows(seen)
         few = moved.part(rows)
         few_to_tx = [d[rows] for d in to_tx]
-        sampled = np.concatenate([_residuals(block, few, few_to_tx, rx, every) for rx in probes], axis=1)
+        sampled = np.concatenate([_phases(block, few, few_to_tx, rx, every).residuals for rx in probes], axis=1)
         low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
         floor = EXPANSION_SHARE / 50 * accuracy
         used = tuple(i for i in every if max(-low[i], high[i]) > floor)
@@ -81,12 +86,18 @@ class Prepared:
         parameters = [(sampled[i] - m) / h for i, m, h in zip(used, middle, half, strict=True)]
         shapes = [block.shapes[i] for i in used]
         form = LowRank.fit(half, parameters, [b[block.sample_rows] for b in shapes], EXPANSION_SHARE * accuracy)
-        angle = np.zeros(block.time.size)
+        centre = sum(_ends(phases.fast)) / 2, sum(_ends(phases.slow)) / 2
+        axes = _Axes.of(block, phases.fast, phases.slow, centre)
+        asked = TRANSFORM_SHARE * accuracy / form.weights
+        kernels = [Kernel.reaching(float(eps), _single(float(eps), axes)) for eps in asked]
+        angle = centre[0] * block.targets[0] + centre[1] * block.targets[1]
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
         waves = form.waves(shapes, block.time.size) * np.exp(1j * angle)
+        for wave, kernel in zip(waves, kernels, strict=True):
+            wave *= kernel.correction(*block.unit_targets)
         order = 4 if 2 in used else 3 if 1 in used else 2
-        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, waves)
+        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, centre, kernels, waves)
 
     def transform(self, rx_m: FloatArray) -> ComplexArray:
         """Sum the echoes at one receiver: (n_chirps, n_samples)."""
@@ -102,21 +113,23 @@ class Prepared:
             fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
             for x, r, m, h in zip(parameters, phases.residuals, self.middle, self.half, strict=True):
                 x[part] = (r - m) / h
-        axes = _Axes.of(self.block, fast, slow)
+        axes = _Axes.of(self.block, fast, slow, self.centre)
         amplitude = _times_phasor(self.points.amplitude, constant, axes.flips, coarse)
         return self._sum(axes, self.form.strengths(amplitude, parameters)).reshape(self.block.time.shape)
 
     def _sum(self, axes: _Axes, rows: ComplexArray) -> ComplexArray:
         """Transform every row no finer than its weight in the result asks for, and add them up."""
         total = np.zeros(self.block.time.size, dtype=np.complex128)
-        asked = np.minimum(TRANSFORM_SHARE * self.accuracy / self.form.weights, LOOSEST)
-        single = [_single(float(eps), axes) for eps in asked]
-        for first, last in _plans(asked, single):
-            eps = float(asked[first:last].min())
-            sums = _type3(eps, all(single[first:last]), axes, rows[first:last])
-            for value, wave in zip(sums, self.waves[first:last], strict=True):
-                total += value * wave
-        total *= np.exp(1j * (axes.fast_mid * self.block.targets[0] + axes.slow_mid * self.block.targets[1]))
+        for single in (True, False):
+            chosen = [r for r, kernel in enumerate(self.kernels) if kernel.single is single]
+            if not chosen:
+                continue
+            kernels = [self.kernels[r] for r in chosen]
+            shape = axes.shape(max(k.width for k in kernels))
+            x, y = axes.angles(shape, single)
+            at_samples = series(min(k.tolerance for k in kernels), single, shape, *self.block.unit_targets)
+            for r, kernel in zip(chosen, kernels, strict=True):
+                total += at_samples(kernel.spread(shape, x, y, rows[r])) * self.waves[r]
         return total
 
 
@@ -129,12 +142,12 @@ def _probes(rx_m: FloatArray) -> FloatArray:
     return rx_m[[middle, *(i for i in extremes if i != middle)]]
 
 
-def _residuals(
+def _phases(
     block: Block, points: MovedPoints, to_tx: list[FloatArray], rx_m: FloatArray, used: tuple[int, ...]
-) -> FloatArray:
-    """Return the residual phases at one receiver, (len(used), n)."""
+) -> Phases:
+    """Return the phases at one receiver."""
     both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
-    return np.stack(Phases.of(block, both, used).residuals)
+    return Phases.of(block, both, used)
 
 
 def _sample_rows(residuals: FloatArray) -> IntArray:
@@ -150,9 +163,13 @@ def _sample_rows(residuals: FloatArray) -> IntArray:
     return found
 
 
+def _ends(values: FloatArray) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
+
+
 @dataclass(frozen=True)
 class _Axes:
-    """Sources and targets of the transform, shifted and scaled: targets within [-1, 1], sources in radians.
+    """Sources of the transform for targets within [-1, 1], in radians from the centre.
 
     A fast frequency is only known modulo the sampling rate; where multiples of it were taken off, ``flips`` holds the
     phase this changes, half a cycle for an odd multiple and an even number of samples.
@@ -160,29 +177,35 @@ class _Axes:
 
     fast: FloatArray
     slow: FloatArray
-    targets: tuple[FloatArray, FloatArray]
-    fast_mid: float
-    slow_mid: float
     flips: FloatArray | None
-    extent: float
+    fast_half: float
+    slow_half: float
 
     @classmethod
-    def of(cls, block: Block, fast: FloatArray, slow: FloatArray) -> _Axes:
+    def of(cls, block: Block, fast: FloatArray, slow: FloatArray, centre: tuple[float, float]) -> _Axes:
         """Shift and scale angular frequencies [rad/s], in place."""
-        ends = float(fast.min()), float(fast.max())
-        fast_mid, slow_mid = sum(ends) / 2, (float(slow.min()) + float(slow.max())) / 2
-        fast -= fast_mid
+        fast -= centre[0]
         rate = TAU * block.sample_rate_hz
         flips = None
-        if ends[1] - ends[0] > rate:
+        if float(np.ptp(fast)) > rate:
             folds = np.rint(fast / rate)
             fast -= rate * folds
             flips = folds * (len(block.fast_s) - 1) / 2
         fast *= block.fast_half_s
-        slow -= slow_mid
+        slow -= centre[1]
         slow *= block.slow_half_s
-        extent = float(max(fast.max(), -fast.min()) + max(slow.max(), -slow.min()))
-        return cls(fast, slow, block.unit_targets, fast_mid, slow_mid, flips, extent)
+        fast_half, slow_half = (max(high, -low) for low, high in map(_ends, (fast, slow)))
+        return cls(fast, slow, flips, fast_half, slow_half)
+
+    def shape(self, width: int) -> tuple[int, int]:
+        """Return the even sizes of a grid that holds all sources, spread over ``width`` cells, without wrapping."""
+        fast, slow = (2 * math.ceil(half / SPACING + width) for half in (self.fast_half, self.slow_half))
+        return fast, slow
+
+    def angles(self, shape: tuple[int, int], single: bool) -> tuple[FloatArray, FloatArray]:
+        """Return the sources as angles, a grid of ``shape`` being the whole turn."""
+        fast, slow = (TAU / (SPACING * cells) * x for cells, x in zip(shape, (self.fast, self.slow), strict=True))
+        return (fast.astype(np.float32), slow.astype(np.float32)) if single else (fast, slow)
 
 
 def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, single: bool) -> ComplexArray:
@@ -199,38 +222,4 @@ def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray
 
 
 def _single(eps: float, axes: _Axes) -> bool:
-    return eps >= SINGLE_ACCURACY and axes.extent * SINGLE_ULP <= eps
-
-
-def _plans(asked: FloatArray, single: list[bool]) -> list[tuple[int, int]]:
-    """Cut the rows into runs that share a transform, by dynamic programming over measured costs.
-
-    Looser rows want a narrower kernel and single precision, but every transform sorts the points again.
-    """
-    width = np.log10(1 / asked) * 1.2 + 1.5
-    best, back = [0.0], [0]
-    for j in range(1, len(asked) + 1):
-        costs = []
-        for i in range(j):
-            cells, lone = float(width[i:j].max()) ** 2, all(single[i:j])
-            costs.append(best[i] + (35 + (j - i) * (25 + 0.8 * cells) if lone else 60 + (j - i) * (40 + 1.3 * cells)))
-        back.append(int(np.argmin(costs)))
-        best.append(min(costs))
-    runs, j = [], len(asked)
-    while j > 0:
-        runs.append((back[j], j))
-        j = back[j]
-    return runs[::-1]
-
-
-def _type3(eps: float, single: bool, axes: _Axes, rows: ComplexArray) -> ComplexArray:
-    """Sum rows[r, q] exp(j (fast_q s + slow_q T')) at the targets: (n_rows, n_targets)."""
-    import finufft
-
-    real, complex_ = (np.float32, np.complex64) if single else (np.float64, np.complex128)
-    fast, slow, s, t = (x.astype(real, copy=False) for x in (axes.fast, axes.slow, *axes.targets))
-    rows = rows.astype(complex_, copy=False)
-    # groups come sorted by delay and rate already
-    options = {"isign": 1, "nthreads": 1, "upsampfac": UPSAMPLING, "spread_sort": 0, "showwarn": 0}
-    sums = finufft.nufft2d3(fast, slow, rows, s, t, eps=eps, **options)
-    return np.asarray(sums).reshape(len(rows), -1)
+    return eps >= SINGLE_ACCURACY and (axes.fast_half + axes.slow_half) * SINGLE_ULP <= eps
