@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
+from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from .blocks import Block
-from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
+from .delays import COLUMNS, N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
 from .gridding import SPACING, Kernel, series
 
@@ -24,8 +25,6 @@ TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.45, 0.55, 0.1
 SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 2.5e-5
 #: Echoes whose residual phases choose the low-rank form, at each element pair probed.
 SAMPLED_ECHOES = 160
-#: Points worked on at once: their arrays stay in the cache.
-COLUMNS = 8192
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
 
@@ -39,7 +38,7 @@ class Prepared:
     accuracy : float
     block : Block
     points : MovedPoints
-    to_tx : list of (n,) float
+    to_tx : (order + 1, n) float
         Distance to the transmitter and its derivatives.
     used : tuple of int
         The residual phases that matter.
@@ -57,27 +56,34 @@ class Prepared:
     accuracy: float
     block: Block
     points: MovedPoints
-    to_tx: list[FloatArray]
+    to_tx: FloatArray
     used: tuple[int, ...]
     middle: list[float]
     half: list[float]
     form: LowRank
-    centre: tuple[float, float]
+    centre: FloatArray
     kernels: list[Kernel]
     waves: ComplexArray
 
     @classmethod
     def of(cls, accuracy: float, block: Block, moved: MovedPoints, tx_m: FloatArray, rx_m: FloatArray) -> Prepared:
         """Choose the low-rank form from the echoes, seen from the elements that differ most."""
-        to_tx = moved.range_derivatives(tx_m, 4)
         every = tuple(range(N_RESIDUALS))
         probes = _probes(rx_m)
-        phases = _phases(block, moved, to_tx, probes[0], every)
-        seen = np.stack(phases.residuals)
+        to_tx, seen = np.empty((5, len(moved))), np.empty((N_RESIDUALS, len(moved)))
+
+        def look(part: slice) -> tuple[float, ...]:
+            points = moved.part(part)
+            to_tx[:, part] = points.range_derivatives(tx_m, 4)
+            phases = _phases(block, points, to_tx[:, part], probes[0], every)
+            seen[:, part] = phases.residuals
+            return *_ends(phases.fast), *_ends(phases.slow)
+
+        ends = np.array(map_blocks(look, len(moved), COLUMNS))
+        first, last = ends[:, ::2].min(axis=0), ends[:, 1::2].max(axis=0)
         rows = _sample_rows(seen)
         few = moved.part(rows)
-        few_to_tx = [d[rows] for d in to_tx]
-        sampled = np.concatenate([_phases(block, few, few_to_tx, rx, every).residuals for rx in probes], axis=1)
+        sampled = np.concatenate([_phases(block, few, to_tx[:, rows], rx, every).residuals for rx in probes], axis=1)
         low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
         floor = EXPANSION_SHARE / 50 * accuracy
         used = tuple(i for i in every if max(-low[i], high[i]) > floor)
@@ -86,10 +92,10 @@ class Prepared:
         parameters = [(sampled[i] - m) / h for i, m, h in zip(used, middle, half, strict=True)]
         shapes = [block.shapes[i] for i in used]
         form = LowRank.fit(half, parameters, [b[block.sample_rows] for b in shapes], EXPANSION_SHARE * accuracy)
-        centre = sum(_ends(phases.fast)) / 2, sum(_ends(phases.slow)) / 2
-        axes = _Axes.of(block, phases.fast, phases.slow, centre)
+        centre = (first + last) / 2
+        extent = _extent(block, *map(float, last - first))
         asked = TRANSFORM_SHARE * accuracy / form.weights
-        kernels = [Kernel.reaching(float(eps), _single(float(eps), axes)) for eps in asked]
+        kernels = [Kernel.reaching(float(eps), _single(float(eps), extent)) for eps in asked]
         angle = centre[0] * block.targets[0] + centre[1] * block.targets[1]
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
@@ -109,7 +115,7 @@ class Prepared:
         for first in range(0, n, COLUMNS):
             part = slice(first, first + COLUMNS)
             back = self.points.part(part).range_derivatives(rx_m, order)
-            phases = Phases.of(self.block, [a[part] + b for a, b in zip(self.to_tx, back, strict=True)], self.used)
+            phases = Phases.of(self.block, [a + b for a, b in zip(self.to_tx[:, part], back, strict=True)], self.used)
             fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
             for x, r, m, h in zip(parameters, phases.residuals, self.middle, self.half, strict=True):
                 x[part] = (r - m) / h
@@ -121,7 +127,7 @@ class Prepared:
         """Transform every row no finer than its weight in the result asks for, and add them up."""
         total = np.zeros(self.block.time.size, dtype=np.complex128)
         for single in (True, False):
-            chosen = [r for r, kernel in enumerate(self.kernels) if kernel.single is single]
+            chosen = [r for r, kernel in enumerate(self.kernels) if kernel.single == single]
             if not chosen:
                 continue
             kernels = [self.kernels[r] for r in chosen]
@@ -143,7 +149,7 @@ def _probes(rx_m: FloatArray) -> FloatArray:
 
 
 def _phases(
-    block: Block, points: MovedPoints, to_tx: list[FloatArray], rx_m: FloatArray, used: tuple[int, ...]
+    block: Block, points: MovedPoints, to_tx: FloatArray, rx_m: FloatArray, used: tuple[int, ...]
 ) -> Phases:
     """Return the phases at one receiver."""
     both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
@@ -182,7 +188,7 @@ class _Axes:
     slow_half: float
 
     @classmethod
-    def of(cls, block: Block, fast: FloatArray, slow: FloatArray, centre: tuple[float, float]) -> _Axes:
+    def of(cls, block: Block, fast: FloatArray, slow: FloatArray, centre: FloatArray) -> _Axes:
         """Shift and scale angular frequencies [rad/s], in place."""
         fast -= centre[0]
         rate = TAU * block.sample_rate_hz
@@ -221,5 +227,10 @@ def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray
     return phasor
 
 
-def _single(eps: float, axes: _Axes) -> bool:
-    return eps >= SINGLE_ACCURACY and (axes.fast_half + axes.slow_half) * SINGLE_ULP <= eps
+def _extent(block: Block, fast: float, slow: float) -> float:
+    """Return the largest angle of a source from the centre [rad], from the spread of the frequencies [rad/s]."""
+    return (min(fast, TAU * block.sample_rate_hz) * block.fast_half_s + slow * block.slow_half_s) / 2
+
+
+def _single(eps: float, extent: float) -> bool:
+    return eps >= SINGLE_ACCURACY and extent * SINGLE_ULP <= eps
