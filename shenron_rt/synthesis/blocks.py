@@ -12,18 +12,21 @@ from functools import cached_property
 
 import numpy as np
 
+from .._parallel import map_blocks
 from .._typing import FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .expansion import MAX_AMPLITUDE, rank
 from .signal import Clock, Points
 
-__all__ = ["Block", "Group", "cut", "group_points"]
+__all__ = ["COLUMNS", "Block", "Group", "cut", "group_points"]
 
 #: Costs in nanoseconds, of one core, to choose by: of a transform per point and per point and term; per transform; per
 #: term and cell of its grid, and per term and sample; of the exact sum per point and sample.
 COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 350.0, 60.0, 1.5e6, 8.0, 80.0, 70.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
+#: Points worked on at once: their arrays stay in the cache.
+COLUMNS = 8192
 
 
 @dataclass(frozen=True)
@@ -168,26 +171,12 @@ def group_points(
         count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
     if len(todo):
         groups.append(Group(0, todo))
-    order = _delay_rate_order(points)
+    order = bound.delay_rate_cells()
     return [
         Group(g.blocks, rows)
         for g in groups
         for rows in np.array_split(_in_order(g.rows, order), -(-len(g.rows) // CHUNK))
     ]
-
-
-def _delay_rate_order(points: Points) -> IntArray:
-    """Return (n,) cell numbers by range rate, then range: points in this order are near each other on the grid."""
-    if not len(points):
-        return np.zeros(0, dtype=np.int16)
-    r = np.sqrt(np.einsum("qi,qi->q", points.position, points.position))
-    rate = np.einsum("qi,qi->q", points.position, points.velocity) / np.maximum(r, 1e-9)
-    cells = [
-        np.minimum((x - x.min()) * (n / max(float(np.ptp(x)), 1e-9)), n - 1).astype(np.int16)
-        for x, n in ((rate, 64), (r, 256))
-    ]
-    found: IntArray = cells[0] * np.int16(256) + cells[1]
-    return found
 
 
 def _in_order(rows: IntArray, order: IntArray) -> IntArray:
@@ -208,25 +197,45 @@ class _Bounds:
     speed: FloatArray
     least: FloatArray
     farthest: FloatArray
+    range: FloatArray
+    rate: FloatArray
 
     @classmethod
     def of(cls, clock: Clock, points: Points, chirp_start_s: FloatArray, radius: float) -> _Bounds:
-        first = chirp_start_s.min() + clock.sample_s[0] - clock.frame_mid_s
-        last = chirp_start_s.max() + clock.sample_s[-1] - clock.frame_mid_s
-        p, v = points.position, points.velocity
-        square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
-        range_square = np.einsum("qi,qi->q", p, p)
-        speed = np.sqrt(square)
-        safe = np.where(square > 0, square, 1.0)
-        line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
-        closest = np.clip(-along / safe, first, last)
-        least = np.sqrt(np.maximum(range_square + (2 * along + square * closest) * closest, 0.0)) - radius
-        farthest = np.sqrt(range_square) + speed * max(abs(first), abs(last)) + radius
-        with np.errstate(divide="ignore"):
-            inverse = np.where(least > 0, 1 / np.maximum(least, 1e-300), np.inf)
-        lever = np.minimum((line + radius) * inverse, 1.0)
-        curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
-        return cls(curvature, speed, np.maximum(least, 1e-9), farthest)
+        first = float(chirp_start_s.min() + clock.sample_s[0]) - clock.frame_mid_s
+        last = float(chirp_start_s.max() + clock.sample_s[-1]) - clock.frame_mid_s
+        found = np.empty((6, len(points)))
+
+        def fill(part: slice) -> None:
+            p, v = points.position[part], points.velocity[part]
+            square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
+            range_square = np.einsum("qi,qi->q", p, p)
+            r, speed = np.sqrt(range_square), np.sqrt(square)
+            safe = np.where(square > 0, square, 1.0)
+            line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
+            closest = np.clip(-along / safe, first, last)
+            least = np.sqrt(np.maximum(range_square + (2 * along + square * closest) * closest, 0.0)) - radius
+            farthest = r + speed * max(abs(first), abs(last)) + radius
+            with np.errstate(divide="ignore"):
+                inverse = np.where(least > 0, 1 / np.maximum(least, 1e-300), np.inf)
+            lever = np.minimum((line + radius) * inverse, 1.0)
+            curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
+            rate = along / np.maximum(r, 1e-9)
+            found[:, part] = curvature, speed, np.maximum(least, 1e-9), farthest, r, rate
+
+        map_blocks(fill, len(points), COLUMNS)
+        return cls(*found)
+
+    def delay_rate_cells(self) -> IntArray:
+        """Return (n,) cell numbers by range rate, then range: points in this order are near each other on the grid."""
+        if not len(self.range):
+            return np.zeros(0, dtype=np.int16)
+        cells = [
+            np.minimum((x - x.min()) * (n / max(float(np.ptp(x)), 1e-9)), n - 1).astype(np.int16)
+            for x, n in ((self.rate, 64), (self.range, 256))
+        ]
+        found: IntArray = cells[0] * np.int16(256) + cells[1]
+        return found
 
     def cells(self, clock: Clock, rows: IntArray, half: float) -> float:
         """Estimate the cells of the grid of a transform from the spread of delay and rate."""
@@ -261,7 +270,7 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
     if not len(phase):
         return []
     edges = np.unique(np.concatenate([np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
-    cell = np.searchsorted(edges, phase)
+    cell = np.concatenate(map_blocks(lambda part: np.searchsorted(edges, phase[part]), len(phase), COLUMNS))
     counts = np.bincount(cell, minlength=len(edges) + 1)
     at = np.concatenate([[0], np.flatnonzero(counts) + 1])
     before = np.concatenate([[0], np.cumsum(counts)])

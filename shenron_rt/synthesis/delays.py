@@ -9,16 +9,14 @@ import numpy as np
 from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .blocks import Block
+from .blocks import COLUMNS, Block
 from .signal import Points
 
-__all__ = ["COLUMNS", "N_RESIDUALS", "MovedPoints", "Phases"]
+__all__ = ["N_RESIDUALS", "MovedPoints", "Phases"]
 
 TAU = 2 * np.pi
 #: Residual phases: curvature of orders 2, 3, 4, and the fast x slow part of the quadratic delay term.
 N_RESIDUALS = 4
-#: Points worked on at once: their arrays stay in the cache.
-COLUMNS = 8192
 
 
 @dataclass(frozen=True)

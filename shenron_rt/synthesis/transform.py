@@ -11,8 +11,8 @@ from numpy.typing import DTypeLike
 
 from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
-from .blocks import Block
-from .delays import COLUMNS, N_RESIDUALS, TAU, MovedPoints, Phases
+from .blocks import COLUMNS, Block
+from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
 from .gridding import SPACING, Kernel, series
 
