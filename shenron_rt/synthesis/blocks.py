@@ -20,9 +20,10 @@ from .signal import Clock, Points
 
 __all__ = ["COLUMNS", "Block", "Group", "cut", "group_points"]
 
-#: Costs in nanoseconds, of one core, to choose by: of a transform per point and per point and term; per transform; per
-#: term and cell of its grid, and per term and sample; of the exact sum per point and sample.
-COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 350.0, 60.0, 1.5e6, 8.0, 80.0, 70.0
+#: Costs in nanoseconds, of one core, to choose by: of a transform; per point of it, and per point and term; per term,
+#: per term and cell of its grid, and per term and sample; of the exact sum per point and sample.
+COST_TRANSFORM, COST_POINT, COST_SPREAD = 0.8e6, 60.0, 40.0
+COST_TERM, COST_CELL, COST_SAMPLE, COST_EXACT = 0.2e6, 20.0, 15.0, 55.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
 #: Points worked on at once: their arrays stay in the cache.
@@ -163,7 +164,7 @@ def group_points(
         half = max(block.half_s for block in cut(clock, chirp_start_s, count))
         curvature, neglected = bound.phases(clock, todo, half)
         fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
-        term = COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
+        term = COST_TERM + COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
         for rows, cost in _by_curvature(curvature[fits], 4 * tolerance, term):
             exact = COST_EXACT * samples * len(rows)
             groups.append(Group(count if count * cost < exact else 0, todo[fits][rows]))
@@ -238,13 +239,13 @@ class _Bounds:
         return found
 
     def cells(self, clock: Clock, rows: IntArray, half: float) -> float:
-        """Estimate the cells of the grid of a transform from the spread of delay and rate."""
+        """Estimate the cells of a grid, twice oversampled, from the spread of delay and rate."""
         if not len(rows):
             return 0.0
-        delay = 4 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(self.farthest[rows]))
-        fast = min(delay * float(np.ptp(clock.sample_s)) / 2, len(clock.sample_s))
-        slow = 8 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
-        return 1.25**4 * (fast + 10) * (slow + 10)
+        swept = 2 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(clock.sample_s))
+        fast = 2 * min(swept * float(np.ptp(self.farthest[rows])), len(clock.sample_s))
+        slow = 16 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
+        return (fast + 16) * (slow + 16)
 
     def phases(self, clock: Clock, rows: IntArray, half: float) -> tuple[FloatArray, FloatArray]:
         """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
@@ -282,7 +283,7 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
             top = edges[min(at[j] - 1, len(edges) - 1)]
             terms = rank((top - lower[at[i]]) / 2, tolerance)
             size = int(before[at[j]] - before[at[i]])
-            costs.append(best[i] + COST_SETUP + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
+            costs.append(best[i] + COST_TRANSFORM + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
         back.append(int(np.argmin(costs)))
         best.append(min(costs))
     groups, j = [], len(at) - 1

@@ -125,7 +125,8 @@ def _kernel(digits: int, single: bool) -> Kernel:
         found: FloatArray = 1 / (np.cos(np.sqrt(np.maximum(square, 0.0))[:, None] * offset) @ values)
         return found
 
-    return Kernel(tolerance, single, width, Chebyshev.interpolate(reciprocal, _DEGREE, [0, SPACING**2]))
+    found = Chebyshev.interpolate(reciprocal, _DEGREE, [0, SPACING**2])
+    return Kernel(tolerance, single, width, found.trim(found.coef[0] * tolerance / 100))
 
 
 def series(
