@@ -11,20 +11,21 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import ComplexArray, FloatArray, NDArray
 
 __all__ = ["MAX_AMPLITUDE", "LowRank", "monomials", "rank", "series_orders"]
 
 #: Largest amplitude of a factor [rad]; beyond it the frame is cut into shorter blocks.
 MAX_AMPLITUDE = 3.0
 _ORDER_LIMIT = 40
-#: Largest m k n of a matrix product (m, k) @ (k, n), and rows of a factorisation: so few that BLAS stays on one thread
-#: (OpenBLAS up to 2^18). Bytes then do not depend on its threads, which would wait for each other wherever the cores
-#: have other work.
-_PRODUCT, _ROWS = 1 << 17, 128
+#: Largest m k n of a matrix product (m, k) @ (k, n), and largest m n of a factorisation, for which OpenBLAS stays on
+#: one thread. Bytes then do not depend on its threads, which would wait for each other wherever the cores have other
+#: work.
+_PRODUCT, _FACTORISED = 1 << 16, 1 << 13
 #: Columns of monomials at once: they stay in the cache.
 _COLUMNS = 2048
 
@@ -154,13 +155,13 @@ class LowRank:
         x = monomials(parameters, orders, np.empty((len(orders), len(parameters[0])))).T
         b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
         r_x, r_b = _triangle(x), _triangle(b)
-        u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T, full_matrices=False)
-        left = turn[:, None] * (r_b.T @ vh.conj().T)
+        u, s, vh = np.linalg.svd(_product(r_x * turn, r_b.T), full_matrices=False)
+        left = turn[:, None] * _product(r_b.T, vh.conj().T)
         # row r of tails: RMS error of every echo where r terms are kept
-        parts = np.concatenate([np.abs(x[rows] @ left) ** 2 for rows in _slices(len(x), left.size)])
+        parts = np.abs(_product(left.T, x.T).T) ** 2
         tails = np.sqrt(np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]).max(axis=0)
         kept = max(1, int(np.count_nonzero(tails > tolerance)))
-        right = (u[:, :kept].conj().T @ r_x) * (turn * scale) / s[:kept, None]
+        right = _product(u[:, :kept].conj().T, r_x) * (turn * scale) / s[:kept, None]
         return cls(orders, left[:, :kept], right, np.sqrt(parts[:, :kept].max(axis=0)))
 
     def strengths(self, amplitude: ComplexArray, parameters: Sequence[FloatArray]) -> ComplexArray:
@@ -181,17 +182,18 @@ class LowRank:
         return out
 
 
-def _slices(count: int, others: int) -> list[slice]:
-    """Cut one dimension of a matrix product, of which the other two multiply to ``others``."""
-    step = max(1, _PRODUCT // others)
-    return [slice(i, min(i + step, count)) for i in range(0, count, step)]
+def _product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Return a @ b, some columns of b at a time."""
+    step = max(1, _PRODUCT // a.size)
+    return np.concatenate([a @ b[:, first : first + step] for first in range(0, b.shape[1], step)], axis=1)
 
 
 def _triangle(x: FloatArray) -> FloatArray:
     """Return R of x = QR, (min(m, n), n), from some rows of x at a time."""
-    r = x[:0]
-    for first in range(0, len(x), _ROWS):
-        _, r = np.linalg.qr(np.concatenate([r, x[first : first + _ROWS]]))
+    r, count = x[:0], x.shape[1]
+    step = max(16, _FACTORISED // count - count)
+    for first in range(0, len(x), step):
+        _, r = np.linalg.qr(np.concatenate([r, x[first : first + step]]))
     return r
 
 
@@ -203,6 +205,5 @@ def _combine(matrix: ComplexArray, orders: list[Orders], values: Sequence[FloatA
         columns = slice(first, first + _COLUMNS)
         cells = out[:, columns]
         terms = _fill([v[columns] for v in values], steps, buffer[:, : cells.shape[1]])
-        for few in _slices(cells.shape[1], parts.size):
-            both = parts @ terms[:, few]
-            cells.real[:, few], cells.imag[:, few] = both[: len(out)], both[len(out) :]
+        both = _product(parts, terms)
+        cells.real, cells.imag = both[: len(out)], both[len(out) :]

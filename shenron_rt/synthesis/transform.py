@@ -99,7 +99,7 @@ class Prepared:
         angle = centre[0] * block.targets[0] + centre[1] * block.targets[1]
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
-        waves = form.waves(shapes, block.time.size) * np.exp(1j * angle)
+        waves = form.waves(shapes, block.time.size) * _phasor(angle)
         for wave, kernel in zip(waves, kernels, strict=True):
             wave *= kernel.correction(*block.unit_targets)
         order = 4 if 2 in used else 3 if 1 in used else 2
@@ -148,9 +148,7 @@ def _probes(rx_m: FloatArray) -> FloatArray:
     return rx_m[[middle, *(i for i in extremes if i != middle)]]
 
 
-def _phases(
-    block: Block, points: MovedPoints, to_tx: FloatArray, rx_m: FloatArray, used: tuple[int, ...]
-) -> Phases:
+def _phases(block: Block, points: MovedPoints, to_tx: FloatArray, rx_m: FloatArray, used: tuple[int, ...]) -> Phases:
     """Return the phases at one receiver."""
     both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
     return Phases.of(block, both, used)
@@ -218,12 +216,17 @@ def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray
     """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
     turn = cycles if flips is None else cycles + flips
     turn = turn - np.rint(turn)
-    dtype: DTypeLike = np.complex64 if single else np.complex128
-    phasor: ComplexArray = np.empty(len(turn), dtype=dtype)
-    angle = TAU * turn.astype(phasor.real.dtype)
+    dtype: DTypeLike = np.float32 if single else np.float64
+    phasor = _phasor(TAU * turn.astype(dtype, copy=False))
+    phasor *= amplitude.astype(phasor.dtype, copy=False)
+    return phasor
+
+
+def _phasor(angle: FloatArray) -> ComplexArray:
+    """Return exp(j angle), in the precision of ``angle``."""
+    phasor: ComplexArray = np.empty(angle.shape, dtype=np.result_type(angle, np.complex64))
     np.cos(angle, out=phasor.real)
     np.sin(angle, out=phasor.imag)
-    phasor *= amplitude.astype(dtype, copy=False)
     return phasor
 
 
