@@ -143,5 +143,9 @@ def series(
     upsampling = SERIES_UPSAMPLING if asked >= SERIES_FINEST else UPSAMPLING
     plan = finufft.Plan(2, shape, 1, asked, 1, dtype=complex_, upsampfac=upsampling, **_OPTIONS)
     plan.setpts((SPACING * s).astype(real), (SPACING * t).astype(real))
-    execute: Callable[[ComplexArray], ComplexArray] = plan.execute
-    return execute
+
+    def at_targets(grid: ComplexArray) -> ComplexArray:
+        sums: ComplexArray = plan.execute(grid.astype(complex_, copy=False))
+        return sums
+
+    return at_targets

@@ -21,8 +21,9 @@ __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 #: Shares of the accuracy: the transforms, the expansion, what is neglected. The first two are independent errors, the
 #: second a bound for the worst echo; they add to 0.7 at most in the tests.
 TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.45, 0.55, 0.1
-#: Rounding of a single-precision coordinate (RMS of half an ulp), and the finest accuracy single precision reaches.
-SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 2.5e-5
+#: RMS error of sources one radian from the centre where points are spread, and where the series is summed, in single
+#: precision (measured: 4e-8 to 6e-8, 1.0e-7 to 2.5e-7), and the finest accuracy single precision reaches.
+SPREAD_ROUNDING, SERIES_ROUNDING, SINGLE_ACCURACY = 5e-8, 1.5e-7, 2.5e-5
 #: Echoes whose residual phases choose the low-rank form, at each element pair probed.
 SAMPLED_ECHOES = 160
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
@@ -49,6 +50,8 @@ class Prepared:
         Of the fast and slow angular frequencies [rad/s].
     kernels : list of Kernel
         For every row of the form.
+    coarse : list of bool
+        Whether the series of a row is summed in single precision.
     waves : (R, n_samples) complex
         The form at the samples of the block, with the phase of the centres and the correction for the kernel.
     """
@@ -63,6 +66,7 @@ class Prepared:
     form: LowRank
     centre: FloatArray
     kernels: list[Kernel]
+    coarse: list[bool]
     waves: ComplexArray
 
     @classmethod
@@ -95,7 +99,8 @@ class Prepared:
         centre = (first + last) / 2
         extent = _extent(block, *map(float, last - first))
         asked = TRANSFORM_SHARE * accuracy / form.weights
-        kernels = [Kernel.reaching(float(eps), _single(float(eps), extent)) for eps in asked]
+        kernels = [Kernel.reaching(float(eps), _single(eps, SPREAD_ROUNDING * extent)) for eps in asked]
+        coarse = [_single(eps, SERIES_ROUNDING * extent) for eps in asked]
         angle = centre[0] * block.targets[0] + centre[1] * block.targets[1]
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
@@ -103,7 +108,7 @@ class Prepared:
         for wave, kernel in zip(waves, kernels, strict=True):
             wave *= kernel.correction(*block.unit_targets)
         order = 4 if 2 in used else 3 if 1 in used else 2
-        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, centre, kernels, waves)
+        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, centre, kernels, coarse, waves)
 
     def transform(self, rx_m: FloatArray) -> ComplexArray:
         """Sum the echoes at one receiver: (n_chirps, n_samples)."""
@@ -126,16 +131,16 @@ class Prepared:
     def _sum(self, axes: _Axes, rows: ComplexArray) -> ComplexArray:
         """Transform every row no finer than its weight in the result asks for, and add them up."""
         total = np.zeros(self.block.time.size, dtype=np.complex128)
+        shape = axes.shape(max(kernel.width for kernel in self.kernels))
+        x, y = axes.angles(shape)
         for single in (True, False):
-            chosen = [r for r, kernel in enumerate(self.kernels) if kernel.single == single]
+            chosen = [r for r, coarse in enumerate(self.coarse) if coarse is single]
             if not chosen:
                 continue
-            kernels = [self.kernels[r] for r in chosen]
-            shape = axes.shape(max(k.width for k in kernels))
-            x, y = axes.angles(shape, single)
-            at_samples = series(min(k.tolerance for k in kernels), single, shape, *self.block.unit_targets)
-            for r, kernel in zip(chosen, kernels, strict=True):
-                total += at_samples(kernel.spread(shape, x, y, rows[r])) * self.waves[r]
+            tolerance = min(self.kernels[r].tolerance for r in chosen)
+            at_samples = series(tolerance, single, shape, *self.block.unit_targets)
+            for r in chosen:
+                total += at_samples(self.kernels[r].spread(shape, x, y, rows[r])) * self.waves[r]
         return total
 
 
@@ -206,10 +211,10 @@ class _Axes:
         fast, slow = (2 * math.ceil(half / SPACING + width) for half in (self.fast_half, self.slow_half))
         return fast, slow
 
-    def angles(self, shape: tuple[int, int], single: bool) -> tuple[FloatArray, FloatArray]:
+    def angles(self, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
         """Return the sources as angles, a grid of ``shape`` being the whole turn."""
         fast, slow = (TAU / (SPACING * cells) * x for cells, x in zip(shape, (self.fast, self.slow), strict=True))
-        return (fast.astype(np.float32), slow.astype(np.float32)) if single else (fast, slow)
+        return fast, slow
 
 
 def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, single: bool) -> ComplexArray:
@@ -231,9 +236,9 @@ def _phasor(angle: FloatArray) -> ComplexArray:
 
 
 def _extent(block: Block, fast: float, slow: float) -> float:
-    """Return the largest angle of a source from the centre [rad], from the spread of the frequencies [rad/s]."""
-    return (min(fast, TAU * block.sample_rate_hz) * block.fast_half_s + slow * block.slow_half_s) / 2
+    """Return the largest distance of a source from the centre [rad], from the spread of the frequencies [rad/s]."""
+    return math.hypot(min(fast, TAU * block.sample_rate_hz) * block.fast_half_s, slow * block.slow_half_s) / 2
 
 
-def _single(eps: float, extent: float) -> bool:
-    return eps >= SINGLE_ACCURACY and extent * SINGLE_ULP <= eps
+def _single(eps: float, rounding: float) -> bool:
+    return bool(eps >= SINGLE_ACCURACY and rounding <= eps)
