@@ -79,6 +79,14 @@ def test_nufft_reaches_the_accuracy_for_every_profile(name, accuracy, only_nufft
     assert worst <= 2 * accuracy
 
 
+def test_wide_grids_are_not_summed_in_single_precision(only_nufft):
+    # a thousand Doppler cells: rounding of a coordinate to single precision alone would be 1e-4
+    profile = PROFILES["radarbook"]
+    returns = draw_returns(np.random.default_rng(hash_of("radarbook") + 2), 60, profile)
+    exact = synthesize(returns, profile, noise=None, method="direct").data
+    assert relative_error(synthesize(returns, profile, noise=None, accuracy=1e-4).data, exact) <= 1e-4
+
+
 def hash_of(name: str) -> int:
     return sum(name.encode())
 

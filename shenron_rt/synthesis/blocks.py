@@ -12,18 +12,22 @@ from functools import cached_property
 
 import numpy as np
 
+from .._parallel import map_blocks
 from .._typing import FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .expansion import MAX_AMPLITUDE, rank
 from .signal import Clock, Points
 
-__all__ = ["Block", "Group", "cut", "group_points"]
+__all__ = ["COLUMNS", "Block", "Group", "cut", "group_points"]
 
-#: Costs in nanoseconds, of one core, to choose by: of a transform per point and per point and term; per transform; per
-#: term and cell of its grid, and per term and sample; of the exact sum per point and sample.
-COST_POINT, COST_SPREAD, COST_SETUP, COST_CELL, COST_SAMPLE, COST_EXACT = 350.0, 60.0, 1.5e6, 8.0, 80.0, 70.0
+#: Costs in nanoseconds, of one core, to choose by: of a transform; per point of it, and per point and term; per term,
+#: per term and cell of its grid, and per term and sample; of the exact sum per point and sample.
+COST_TRANSFORM, COST_POINT, COST_SPREAD = 0.8e6, 60.0, 40.0
+COST_TERM, COST_CELL, COST_SAMPLE, COST_EXACT = 0.2e6, 20.0, 15.0, 55.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
+#: Points worked on at once: their arrays stay in the cache.
+COLUMNS = 8192
 
 
 @dataclass(frozen=True)
@@ -160,7 +164,7 @@ def group_points(
         half = max(block.half_s for block in cut(clock, chirp_start_s, count))
         curvature, neglected = bound.phases(clock, todo, half)
         fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
-        term = COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
+        term = COST_TERM + COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
         for rows, cost in _by_curvature(curvature[fits], 4 * tolerance, term):
             exact = COST_EXACT * samples * len(rows)
             groups.append(Group(count if count * cost < exact else 0, todo[fits][rows]))
@@ -168,26 +172,12 @@ def group_points(
         count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
     if len(todo):
         groups.append(Group(0, todo))
-    order = _delay_rate_order(points)
+    order = bound.delay_rate_cells()
     return [
         Group(g.blocks, rows)
         for g in groups
         for rows in np.array_split(_in_order(g.rows, order), -(-len(g.rows) // CHUNK))
     ]
-
-
-def _delay_rate_order(points: Points) -> IntArray:
-    """Return (n,) cell numbers by range rate, then range: points in this order are near each other on the grid."""
-    if not len(points):
-        return np.zeros(0, dtype=np.int16)
-    r = np.sqrt(np.einsum("qi,qi->q", points.position, points.position))
-    rate = np.einsum("qi,qi->q", points.position, points.velocity) / np.maximum(r, 1e-9)
-    cells = [
-        np.minimum((x - x.min()) * (n / max(float(np.ptp(x)), 1e-9)), n - 1).astype(np.int16)
-        for x, n in ((rate, 64), (r, 256))
-    ]
-    found: IntArray = cells[0] * np.int16(256) + cells[1]
-    return found
 
 
 def _in_order(rows: IntArray, order: IntArray) -> IntArray:
@@ -208,34 +198,54 @@ class _Bounds:
     speed: FloatArray
     least: FloatArray
     farthest: FloatArray
+    range: FloatArray
+    rate: FloatArray
 
     @classmethod
     def of(cls, clock: Clock, points: Points, chirp_start_s: FloatArray, radius: float) -> _Bounds:
-        first = chirp_start_s.min() + clock.sample_s[0] - clock.frame_mid_s
-        last = chirp_start_s.max() + clock.sample_s[-1] - clock.frame_mid_s
-        p, v = points.position, points.velocity
-        square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
-        range_square = np.einsum("qi,qi->q", p, p)
-        speed = np.sqrt(square)
-        safe = np.where(square > 0, square, 1.0)
-        line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
-        closest = np.clip(-along / safe, first, last)
-        least = np.sqrt(np.maximum(range_square + (2 * along + square * closest) * closest, 0.0)) - radius
-        farthest = np.sqrt(range_square) + speed * max(abs(first), abs(last)) + radius
-        with np.errstate(divide="ignore"):
-            inverse = np.where(least > 0, 1 / np.maximum(least, 1e-300), np.inf)
-        lever = np.minimum((line + radius) * inverse, 1.0)
-        curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
-        return cls(curvature, speed, np.maximum(least, 1e-9), farthest)
+        first = float(chirp_start_s.min() + clock.sample_s[0]) - clock.frame_mid_s
+        last = float(chirp_start_s.max() + clock.sample_s[-1]) - clock.frame_mid_s
+        found = np.empty((6, len(points)))
+
+        def fill(part: slice) -> None:
+            p, v = points.position[part], points.velocity[part]
+            square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
+            range_square = np.einsum("qi,qi->q", p, p)
+            r, speed = np.sqrt(range_square), np.sqrt(square)
+            safe = np.where(square > 0, square, 1.0)
+            line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
+            closest = np.clip(-along / safe, first, last)
+            least = np.sqrt(np.maximum(range_square + (2 * along + square * closest) * closest, 0.0)) - radius
+            farthest = r + speed * max(abs(first), abs(last)) + radius
+            with np.errstate(divide="ignore"):
+                inverse = np.where(least > 0, 1 / np.maximum(least, 1e-300), np.inf)
+            lever = np.minimum((line + radius) * inverse, 1.0)
+            curvature = np.where(square > 0, square * lever**2 * np.minimum(inverse, 1e9), 0.0)
+            rate = along / np.maximum(r, 1e-9)
+            found[:, part] = curvature, speed, np.maximum(least, 1e-9), farthest, r, rate
+
+        map_blocks(fill, len(points), COLUMNS)
+        return cls(*found)
+
+    def delay_rate_cells(self) -> IntArray:
+        """Return (n,) cell numbers by range rate, then range: points in this order are near each other on the grid."""
+        if not len(self.range):
+            return np.zeros(0, dtype=np.int16)
+        cells = [
+            np.minimum((x - x.min()) * (n / max(float(np.ptp(x)), 1e-9)), n - 1).astype(np.int16)
+            for x, n in ((self.rate, 64), (self.range, 256))
+        ]
+        found: IntArray = cells[0] * np.int16(256) + cells[1]
+        return found
 
     def cells(self, clock: Clock, rows: IntArray, half: float) -> float:
-        """Estimate the cells of the grid of a transform from the spread of delay and rate."""
+        """Estimate the cells of a grid, twice oversampled, from the spread of delay and rate."""
         if not len(rows):
             return 0.0
-        delay = 4 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(self.farthest[rows]))
-        fast = min(delay * float(np.ptp(clock.sample_s)) / 2, len(clock.sample_s))
-        slow = 8 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
-        return 1.25**4 * (fast + 10) * (slow + 10)
+        swept = 2 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(clock.sample_s))
+        fast = 2 * min(swept * float(np.ptp(self.farthest[rows])), len(clock.sample_s))
+        slow = 16 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
+        return (fast + 16) * (slow + 16)
 
     def phases(self, clock: Clock, rows: IntArray, half: float) -> tuple[FloatArray, FloatArray]:
         """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
@@ -261,7 +271,7 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
     if not len(phase):
         return []
     edges = np.unique(np.concatenate([np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
-    cell = np.searchsorted(edges, phase)
+    cell = np.concatenate(map_blocks(lambda part: np.searchsorted(edges, phase[part]), len(phase), COLUMNS))
     counts = np.bincount(cell, minlength=len(edges) + 1)
     at = np.concatenate([[0], np.flatnonzero(counts) + 1])
     before = np.concatenate([[0], np.cumsum(counts)])
@@ -273,7 +283,7 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
             top = edges[min(at[j] - 1, len(edges) - 1)]
             terms = rank((top - lower[at[i]]) / 2, tolerance)
             size = int(before[at[j]] - before[at[i]])
-            costs.append(best[i] + COST_SETUP + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
+            costs.append(best[i] + COST_TRANSFORM + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
         back.append(int(np.argmin(costs)))
         best.append(min(costs))
     groups, j = [], len(at) - 1

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .blocks import Block
+from .blocks import COLUMNS, Block
 from .signal import Points
 
 __all__ = ["N_RESIDUALS", "MovedPoints", "Phases"]
@@ -40,10 +41,17 @@ class MovedPoints:
     @classmethod
     def at(cls, points: Points, rows: IntArray, time_s: float) -> MovedPoints:
         """Move some of the points to an instant, seconds from mid-frame."""
-        components = points.components.take(rows, axis=1)
-        v = components[3:]
-        p = components[:3] + time_s * v
-        return cls(points.amplitude[rows], p, v, (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0))
+        vectors = np.empty((2, 3, len(rows)))
+        products = np.empty((3, len(rows)))
+
+        def move(part: slice) -> None:
+            chosen = rows[part]
+            v = vectors[1, :, part] = points.velocity[chosen].T
+            p = vectors[0, :, part] = points.position[chosen].T + time_s * v
+            products[:, part] = (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0)
+
+        map_blocks(move, len(rows), COLUMNS)
+        return cls(points.amplitude[rows], *vectors, *products)
 
     def __len__(self) -> int:
         return len(self.amplitude)

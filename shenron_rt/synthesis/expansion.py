@@ -11,17 +11,22 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import ComplexArray, FloatArray, NDArray
 
 __all__ = ["MAX_AMPLITUDE", "LowRank", "monomials", "rank", "series_orders"]
 
 #: Largest amplitude of a factor [rad]; beyond it the frame is cut into shorter blocks.
 MAX_AMPLITUDE = 3.0
 _ORDER_LIMIT = 40
-#: Columns of a matrix product: small enough that BLAS stays on one thread, so bytes do not depend on its threads.
+#: Largest m k n of a matrix product (m, k) @ (k, n), and largest m n of a factorisation, for which OpenBLAS stays on
+#: one thread. Bytes then do not depend on its threads, which would wait for each other wherever the cores have other
+#: work.
+_PRODUCT, _FACTORISED = 1 << 16, 1 << 13
+#: Columns of monomials at once: they stay in the cache.
 _COLUMNS = 2048
 
 Orders = tuple[int, ...]
@@ -149,16 +154,15 @@ class LowRank:
         turn = np.array([1j ** (sum(o) % 4) for o in orders])
         x = monomials(parameters, orders, np.empty((len(orders), len(parameters[0])))).T
         b = monomials(shapes, orders, np.empty((len(orders), len(shapes[0])))).T * (scale / np.sqrt(len(shapes[0])))
-        q_x, r_x = np.linalg.qr(x)
-        _, r_b = np.linalg.qr(b)
-        u, s, vh = np.linalg.svd((r_x * turn) @ r_b.T, full_matrices=False)
+        r_x, r_b = _triangle(x), _triangle(b)
+        u, s, vh = np.linalg.svd(_product(r_x * turn, r_b.T), full_matrices=False)
+        left = turn[:, None] * _product(r_b.T, vh.conj().T)
         # row r of tails: RMS error of every echo where r terms are kept
-        parts = np.abs(q_x @ u) ** 2 * s**2
-        tails = np.sqrt(np.maximum(np.cumsum(parts[:, ::-1], axis=1)[:, ::-1], 0.0)).max(axis=0)
+        parts = np.abs(_product(left.T, x.T).T) ** 2
+        tails = np.sqrt(np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]).max(axis=0)
         kept = max(1, int(np.count_nonzero(tails > tolerance)))
-        left = turn[:, None] * (r_b.T @ vh[:kept].conj().T)
-        right = (u[:, :kept].conj().T @ r_x) * (turn * scale) / s[:kept, None]
-        return cls(orders, left, right, np.sqrt(parts[:, :kept].max(axis=0)))
+        right = _product(u[:, :kept].conj().T, r_x) * (turn * scale) / s[:kept, None]
+        return cls(orders, left[:, :kept], right, np.sqrt(parts[:, :kept].max(axis=0)))
 
     def strengths(self, amplitude: ComplexArray, parameters: Sequence[FloatArray]) -> ComplexArray:
         """Return amplitude_q times the left factor, (R, n), in the precision of ``amplitude``."""
@@ -178,6 +182,21 @@ class LowRank:
         return out
 
 
+def _product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Return a @ b, some columns of b at a time."""
+    step = max(1, _PRODUCT // a.size)
+    return np.concatenate([a @ b[:, first : first + step] for first in range(0, b.shape[1], step)], axis=1)
+
+
+def _triangle(x: FloatArray) -> FloatArray:
+    """Return R of x = QR, (min(m, n), n), from some rows of x at a time."""
+    r, count = x[:0], x.shape[1]
+    step = max(16, _FACTORISED // count - count)
+    for first in range(0, len(x), step):
+        _, r = np.linalg.qr(np.concatenate([r, x[first : first + step]]))
+    return r
+
+
 def _combine(matrix: ComplexArray, orders: list[Orders], values: Sequence[FloatArray], out: ComplexArray) -> None:
     """Write matrix (R, L) times the monomials (L, n) into ``out``, some columns at a time."""
     parts = np.concatenate([matrix.real, matrix.imag]).astype(out.real.dtype)
@@ -185,5 +204,6 @@ def _combine(matrix: ComplexArray, orders: list[Orders], values: Sequence[FloatA
     for first in range(0, out.shape[1], _COLUMNS):
         columns = slice(first, first + _COLUMNS)
         cells = out[:, columns]
-        both = parts @ _fill([v[columns] for v in values], steps, buffer[:, : cells.shape[1]])
+        terms = _fill([v[columns] for v in values], steps, buffer[:, : cells.shape[1]])
+        both = _product(parts, terms)
         cells.real, cells.imag = both[: len(out)], both[len(out) :]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -43,12 +42,13 @@ class Points:
         position = np.asarray(returns.position, dtype=np.float64)
         velocity = np.asarray(returns.velocity, dtype=np.float64)
         for name, values in (("amplitude", amplitude), ("position", position), ("velocity", velocity)):
-            bad = np.flatnonzero(~np.isfinite(np.atleast_2d(values.T).T).all(axis=1))
-            if len(bad):
-                raise InputError(
-                    f"Returns.{name}: {len(bad)} of {len(values)} rows are NaN or infinite, the first is row {bad[0]} "
-                    f"({values[bad[0]]}); finite numbers are needed"
-                )
+            if np.isfinite(values).all():
+                continue
+            bad = np.flatnonzero(~np.isfinite(np.atleast_2d(values.T)).all(axis=0))
+            raise InputError(
+                f"Returns.{name}: {len(bad)} of {len(values)} rows are NaN or infinite, the first is row {bad[0]} "
+                f"({values[bad[0]]}); finite numbers are needed"
+            )
         points = cls(amplitude, position, velocity)
         heard = np.flatnonzero(amplitude)
         return points if len(heard) == len(amplitude) else points[heard]
@@ -58,11 +58,6 @@ class Points:
 
     def __getitem__(self, rows: slice | IntArray) -> Points:
         return Points(self.amplitude[rows], self.position[rows], self.velocity[rows])
-
-    @cached_property
-    def components(self) -> FloatArray:
-        """(6, n) position and velocity, a contiguous row each."""
-        return np.ascontiguousarray(np.concatenate([self.position.T, self.velocity.T]))
 
 
 @dataclass(frozen=True)

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import DTypeLike
 
+from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
-from .blocks import Block
+from .blocks import COLUMNS, Block
 from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
+from .gridding import SPACING, Kernel, series
 
 __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 
 #: Shares of the accuracy: the transforms, the expansion, what is neglected. The first two are independent errors, the
 #: second a bound for the worst echo; they add to 0.7 at most in the tests.
 TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.45, 0.55, 0.1
-#: Rounding of a single-precision coordinate (RMS of half an ulp), and the finest accuracy single precision reaches.
-SINGLE_ULP, SINGLE_ACCURACY = 3e-8, 2.5e-5
+#: RMS error of sources one radian from the centre where points are spread, and where the series is summed, in single
+#: precision (measured: 4e-8 to 6e-8, 1.0e-7 to 2.5e-7), and the finest accuracy single precision reaches.
+SPREAD_ROUNDING, SERIES_ROUNDING, SINGLE_ACCURACY = 5e-8, 1.5e-7, 2.5e-5
 #: Echoes whose residual phases choose the low-rank form, at each element pair probed.
 SAMPLED_ECHOES = 160
-#: Points worked on at once: their arrays stay in the cache.
-COLUMNS = 8192
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
-#: Oversampling of the transform's grid: the wider grid costs less than the wider kernel a smaller one needs.
-UPSAMPLING = 2.0
-#: Loosest accuracy a transform is asked for.
-LOOSEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,38 +39,55 @@ class Prepared:
     accuracy : float
     block : Block
     points : MovedPoints
-    to_tx : list of (n,) float
+    to_tx : (order + 1, n) float
         Distance to the transmitter and its derivatives.
     used : tuple of int
         The residual phases that matter.
     middle, half : (len(used),) float
         Centre and half spread of each [rad].
     form : LowRank
+    centre : (2,) float
+        Of the fast and slow angular frequencies [rad/s].
+    kernels : list of Kernel
+        For every row of the form.
+    coarse : list of bool
+        Whether the series of a row is summed in single precision.
     waves : (R, n_samples) complex
-        The form at the samples of the block, with the phase of the centres.
+        The form at the samples of the block, with the phase of the centres and the correction for the kernel.
     """
 
     accuracy: float
     block: Block
     points: MovedPoints
-    to_tx: list[FloatArray]
+    to_tx: FloatArray
     used: tuple[int, ...]
     middle: list[float]
     half: list[float]
     form: LowRank
+    centre: FloatArray
+    kernels: list[Kernel]
+    coarse: list[bool]
     waves: ComplexArray
 
     @classmethod
     def of(cls, accuracy: float, block: Block, moved: MovedPoints, tx_m: FloatArray, rx_m: FloatArray) -> Prepared:
         """Choose the low-rank form from the echoes, seen from the elements that differ most."""
-        to_tx = moved.range_derivatives(tx_m, 4)
         every = tuple(range(N_RESIDUALS))
         probes = _probes(rx_m)
-        seen = _residuals(block, moved, to_tx, probes[0], every)
+        to_tx, seen = np.empty((5, len(moved))), np.empty((N_RESIDUALS, len(moved)))
+
+        def look(part: slice) -> tuple[float, ...]:
+            points = moved.part(part)
+            to_tx[:, part] = points.range_derivatives(tx_m, 4)
+            phases = _phases(block, points, to_tx[:, part], probes[0], every)
+            seen[:, part] = phases.residuals
+            return *_ends(phases.fast), *_ends(phases.slow)
+
+        ends = np.array(map_blocks(look, len(moved), COLUMNS))
+        first, last = ends[:, ::2].min(axis=0), ends[:, 1::2].max(axis=0)
         rows = _sample_rows(seen)
         few = moved.part(rows)
-        few_to_tx = [d[rows] for d in to_tx]
-        sampled = np.concatenate([_residuals(block, few, few_to_tx, rx, every) for rx in probes], axis=1)
+        sampled = np.concatenate([_phases(block, few, to_tx[:, rows], rx, every).residuals for rx in probes], axis=1)
         low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
         floor = EXPANSION_SHARE / 50 * accuracy
         used = tuple(i for i in every if max(-low[i], high[i]) > floor)
@@ -81,12 +96,19 @@ class Prepared:
         parameters = [(sampled[i] - m) / h for i, m, h in zip(used, middle, half, strict=True)]
         shapes = [block.shapes[i] for i in used]
         form = LowRank.fit(half, parameters, [b[block.sample_rows] for b in shapes], EXPANSION_SHARE * accuracy)
-        angle = np.zeros(block.time.size)
+        centre = (first + last) / 2
+        extent = _extent(block, *map(float, last - first))
+        asked = TRANSFORM_SHARE * accuracy / form.weights
+        kernels = [Kernel.reaching(float(eps), _single(eps, SPREAD_ROUNDING * extent)) for eps in asked]
+        coarse = [_single(eps, SERIES_ROUNDING * extent) for eps in asked]
+        angle = centre[0] * block.targets[0] + centre[1] * block.targets[1]
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
-        waves = form.waves(shapes, block.time.size) * np.exp(1j * angle)
+        waves = form.waves(shapes, block.time.size) * _phasor(angle)
+        for wave, kernel in zip(waves, kernels, strict=True):
+            wave *= kernel.correction(*block.unit_targets)
         order = 4 if 2 in used else 3 if 1 in used else 2
-        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, waves)
+        return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, centre, kernels, coarse, waves)
 
     def transform(self, rx_m: FloatArray) -> ComplexArray:
         """Sum the echoes at one receiver: (n_chirps, n_samples)."""
@@ -98,25 +120,27 @@ class Prepared:
         for first in range(0, n, COLUMNS):
             part = slice(first, first + COLUMNS)
             back = self.points.part(part).range_derivatives(rx_m, order)
-            phases = Phases.of(self.block, [a[part] + b for a, b in zip(self.to_tx, back, strict=True)], self.used)
+            phases = Phases.of(self.block, [a + b for a, b in zip(self.to_tx[:, part], back, strict=True)], self.used)
             fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
             for x, r, m, h in zip(parameters, phases.residuals, self.middle, self.half, strict=True):
                 x[part] = (r - m) / h
-        axes = _Axes.of(self.block, fast, slow)
+        axes = _Axes.of(self.block, fast, slow, self.centre)
         amplitude = _times_phasor(self.points.amplitude, constant, axes.flips, coarse)
         return self._sum(axes, self.form.strengths(amplitude, parameters)).reshape(self.block.time.shape)
 
     def _sum(self, axes: _Axes, rows: ComplexArray) -> ComplexArray:
         """Transform every row no finer than its weight in the result asks for, and add them up."""
         total = np.zeros(self.block.time.size, dtype=np.complex128)
-        asked = np.minimum(TRANSFORM_SHARE * self.accuracy / self.form.weights, LOOSEST)
-        single = [_single(float(eps), axes) for eps in asked]
-        for first, last in _plans(asked, single):
-            eps = float(asked[first:last].min())
-            sums = _type3(eps, all(single[first:last]), axes, rows[first:last])
-            for value, wave in zip(sums, self.waves[first:last], strict=True):
-                total += value * wave
-        total *= np.exp(1j * (axes.fast_mid * self.block.targets[0] + axes.slow_mid * self.block.targets[1]))
+        shape = axes.shape(max(kernel.width for kernel in self.kernels))
+        x, y = axes.angles(shape)
+        for single in (True, False):
+            chosen = [r for r, coarse in enumerate(self.coarse) if coarse is single]
+            if not chosen:
+                continue
+            tolerance = min(self.kernels[r].tolerance for r in chosen)
+            at_samples = series(tolerance, single, shape, *self.block.unit_targets)
+            for r in chosen:
+                total += at_samples(self.kernels[r].spread(shape, x, y, rows[r])) * self.waves[r]
         return total
 
 
@@ -129,12 +153,10 @@ def _probes(rx_m: FloatArray) -> FloatArray:
     return rx_m[[middle, *(i for i in extremes if i != middle)]]
 
 
-def _residuals(
-    block: Block, points: MovedPoints, to_tx: list[FloatArray], rx_m: FloatArray, used: tuple[int, ...]
-) -> FloatArray:
-    """Return the residual phases at one receiver, (len(used), n)."""
+def _phases(block: Block, points: MovedPoints, to_tx: FloatArray, rx_m: FloatArray, used: tuple[int, ...]) -> Phases:
+    """Return the phases at one receiver."""
     both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
-    return np.stack(Phases.of(block, both, used).residuals)
+    return Phases.of(block, both, used)
 
 
 def _sample_rows(residuals: FloatArray) -> IntArray:
@@ -150,9 +172,13 @@ def _sample_rows(residuals: FloatArray) -> IntArray:
     return found
 
 
+def _ends(values: FloatArray) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
+
+
 @dataclass(frozen=True)
 class _Axes:
-    """Sources and targets of the transform, shifted and scaled: targets within [-1, 1], sources in radians.
+    """Sources of the transform for targets within [-1, 1], in radians from the centre.
 
     A fast frequency is only known modulo the sampling rate; where multiples of it were taken off, ``flips`` holds the
     phase this changes, half a cycle for an odd multiple and an even number of samples.
@@ -160,77 +186,59 @@ class _Axes:
 
     fast: FloatArray
     slow: FloatArray
-    targets: tuple[FloatArray, FloatArray]
-    fast_mid: float
-    slow_mid: float
     flips: FloatArray | None
-    extent: float
+    fast_half: float
+    slow_half: float
 
     @classmethod
-    def of(cls, block: Block, fast: FloatArray, slow: FloatArray) -> _Axes:
+    def of(cls, block: Block, fast: FloatArray, slow: FloatArray, centre: FloatArray) -> _Axes:
         """Shift and scale angular frequencies [rad/s], in place."""
-        ends = float(fast.min()), float(fast.max())
-        fast_mid, slow_mid = sum(ends) / 2, (float(slow.min()) + float(slow.max())) / 2
-        fast -= fast_mid
+        fast -= centre[0]
         rate = TAU * block.sample_rate_hz
         flips = None
-        if ends[1] - ends[0] > rate:
+        if float(np.ptp(fast)) > rate:
             folds = np.rint(fast / rate)
             fast -= rate * folds
             flips = folds * (len(block.fast_s) - 1) / 2
         fast *= block.fast_half_s
-        slow -= slow_mid
+        slow -= centre[1]
         slow *= block.slow_half_s
-        extent = float(max(fast.max(), -fast.min()) + max(slow.max(), -slow.min()))
-        return cls(fast, slow, block.unit_targets, fast_mid, slow_mid, flips, extent)
+        fast_half, slow_half = (max(high, -low) for low, high in map(_ends, (fast, slow)))
+        return cls(fast, slow, flips, fast_half, slow_half)
+
+    def shape(self, width: int) -> tuple[int, int]:
+        """Return the even sizes of a grid that holds all sources, spread over ``width`` cells, without wrapping."""
+        fast, slow = (2 * math.ceil(half / SPACING + width) for half in (self.fast_half, self.slow_half))
+        return fast, slow
+
+    def angles(self, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+        """Return the sources as angles, a grid of ``shape`` being the whole turn."""
+        fast, slow = (TAU / (SPACING * cells) * x for cells, x in zip(shape, (self.fast, self.slow), strict=True))
+        return fast, slow
 
 
 def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, single: bool) -> ComplexArray:
     """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
     turn = cycles if flips is None else cycles + flips
     turn = turn - np.rint(turn)
-    dtype: DTypeLike = np.complex64 if single else np.complex128
-    phasor: ComplexArray = np.empty(len(turn), dtype=dtype)
-    angle = TAU * turn.astype(phasor.real.dtype)
-    np.cos(angle, out=phasor.real)
-    np.sin(angle, out=phasor.imag)
-    phasor *= amplitude.astype(dtype, copy=False)
+    dtype: DTypeLike = np.float32 if single else np.float64
+    phasor = _phasor(TAU * turn.astype(dtype, copy=False))
+    phasor *= amplitude.astype(phasor.dtype, copy=False)
     return phasor
 
 
-def _single(eps: float, axes: _Axes) -> bool:
-    return eps >= SINGLE_ACCURACY and axes.extent * SINGLE_ULP <= eps
+def _phasor(angle: FloatArray) -> ComplexArray:
+    """Return exp(j angle), in the precision of ``angle``."""
+    phasor: ComplexArray = np.empty(angle.shape, dtype=np.result_type(angle, np.complex64))
+    np.cos(angle, out=phasor.real)
+    np.sin(angle, out=phasor.imag)
+    return phasor
 
 
-def _plans(asked: FloatArray, single: list[bool]) -> list[tuple[int, int]]:
-    """Cut the rows into runs that share a transform, by dynamic programming over measured costs.
-
-    Looser rows want a narrower kernel and single precision, but every transform sorts the points again.
-    """
-    width = np.log10(1 / asked) * 1.2 + 1.5
-    best, back = [0.0], [0]
-    for j in range(1, len(asked) + 1):
-        costs = []
-        for i in range(j):
-            cells, lone = float(width[i:j].max()) ** 2, all(single[i:j])
-            costs.append(best[i] + (35 + (j - i) * (25 + 0.8 * cells) if lone else 60 + (j - i) * (40 + 1.3 * cells)))
-        back.append(int(np.argmin(costs)))
-        best.append(min(costs))
-    runs, j = [], len(asked)
-    while j > 0:
-        runs.append((back[j], j))
-        j = back[j]
-    return runs[::-1]
+def _extent(block: Block, fast: float, slow: float) -> float:
+    """Return the largest distance of a source from the centre [rad], from the spread of the frequencies [rad/s]."""
+    return math.hypot(min(fast, TAU * block.sample_rate_hz) * block.fast_half_s, slow * block.slow_half_s) / 2
 
 
-def _type3(eps: float, single: bool, axes: _Axes, rows: ComplexArray) -> ComplexArray:
-    """Sum rows[r, q] exp(j (fast_q s + slow_q T')) at the targets: (n_rows, n_targets)."""
-    import finufft
-
-    real, complex_ = (np.float32, np.complex64) if single else (np.float64, np.complex128)
-    fast, slow, s, t = (x.astype(real, copy=False) for x in (axes.fast, axes.slow, *axes.targets))
-    rows = rows.astype(complex_, copy=False)
-    # groups come sorted by delay and rate already
-    options = {"isign": 1, "nthreads": 1, "upsampfac": UPSAMPLING, "spread_sort": 0, "showwarn": 0}
-    sums = finufft.nufft2d3(fast, slow, rows, s, t, eps=eps, **options)
-    return np.asarray(sums).reshape(len(rows), -1)
+def _single(eps: float, rounding: float) -> bool:
+    return bool(eps >= SINGLE_ACCURACY and rounding <= eps)
