@@ -123,7 +123,9 @@ def test_the_written_config_runs_again_to_the_same_bytes() -> None:
                 np.testing.assert_array_equal(x[key], y[key], err_msg=f"{name}: {key}")
     config = yaml.safe_load(Path("b/config.yaml").read_text())
     assert config["seed"] == 11
-    assert config["run"] == {"frames": "1:2", "rays": 3000, "backend": "scalar", "accuracy": 1e-5, "model": "physical"}
+    assert config["run"] == {
+        "frames": "1:2", "rays": 3000, "max_bounces": 1, "backend": "scalar", "accuracy": 1e-5, "model": "physical",
+    }  # fmt: skip
     assert config["radars"][0]["profile"]["receiver"]["noise_figure_db"] == 12
 
 

@@ -47,6 +47,7 @@ def run(
     seed: int | None = None,
     frames: str | None = None,
     rays: int | None = None,
+    max_bounces: int | None = None,
     backend: BackendName | None = None,
     accuracy: float | None = None,
     model: str | None = None,
@@ -65,6 +66,8 @@ def run(
         Frames A:B, B not included. Default: 0:1.
     rays
         Rays of each radar and frame. Default: 300000.
+    max_bounces
+        Surfaces along a path, 1 to 5. Default: 1.
     backend
         Ray tracing backend. Default: auto (cuda, then llvm, then scalar).
     accuracy
@@ -77,7 +80,10 @@ def run(
 
     overrides = Overrides(set_)
     loaded = load_scene(scene, overrides.scene)
-    given = {"frames": frames, "rays": rays, "backend": backend, "accuracy": accuracy, "model": model}
+    given = {
+        "frames": frames, "rays": rays, "max_bounces": max_bounces, "backend": backend, "accuracy": accuracy,
+        "model": model,
+    }  # fmt: skip
     options = _options(loaded.run, given)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
@@ -103,6 +109,7 @@ def run(
 class _Options:
     frames: str = "0:1"
     rays: int = 300_000
+    max_bounces: int = 1
     backend: str = "auto"
     accuracy: float = 1e-5
     model: str = "physical"
@@ -177,6 +184,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
                     seed=scene.seed,
                     frame=index,
                     rays=options.rays,
+                    max_bounces=options.max_bounces,
                     backend=options.backend,
                     accuracy=options.accuracy,
                     model=options.model,
@@ -195,6 +203,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
         "backend": backends[0],
         "seed": scene.seed,
         "rays": options.rays,
+        "max_bounces": options.max_bounces,
         "model": options.model,
         "radars": radars,
     }
