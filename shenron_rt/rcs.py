@@ -223,17 +223,20 @@ def sweep_rcs(
     if not (math.isfinite(density) and density > 0.0):
         raise InputError(f"rays_per_wavelength: {rays_per_wavelength}; allowed: > 0")
     name, surface = _surface(target, material, permittivity, mesh_frame, units, choose_backend(backend))
-    _check_distance(distance_m, surface)
-
     el, az = (a.ravel() for a in np.meshgrid(np.radians(elevation), np.radians(azimuth), indexing="ij"))
     views = Views(az, el, distance_m)
+    _check_distance(views, surface)
     step = SPEED_OF_LIGHT / float(frequency.max()) / density
     levels = next(n for width, n in _LEVELS if 2.0 * surface.radius <= width * step)
     settings = Settings(step, levels, max_bounces, seed)
     if bistatic is None:
         matrix = scattered(surface, views, frequency, settings)
     else:
-        lit = Views(np.radians([bistatic[0]]), np.radians([bistatic[1]]), distance_m)
+        place = np.radians(_axis("bistatic", bistatic))
+        if len(place) != 2:
+            raise InputError(f"bistatic: (azimuth_deg, elevation_deg) is needed, got {bistatic!r}")
+        lit = Views(place[:1], place[1:], distance_m)
+        _check_distance(lit, surface)
         matrix = scattered(surface, lit, frequency, settings, views)
     pick = [("VH".index(p[0]), "VH".index(p[1])) for p in wanted]
     amplitude = np.stack([matrix[:, :, r, t] for r, t in pick], axis=2)
@@ -318,12 +321,14 @@ def _reflectors(mesh: TaggedMesh, material: str | None) -> tuple[list[Reflector]
     return reflectors, np.array([known.index(n) for n in names], dtype=np.int64)[mesh.part]
 
 
-def _check_distance(distance_m: float | None, surface: Surface) -> None:
-    if distance_m is None:
+def _check_distance(views: Views, surface: Surface) -> None:
+    """Refuse a radar that has part of the target beside or behind it."""
+    if views.distance is None:
         return
-    needed = float(np.linalg.norm(surface.mesh.vertices[np.unique(surface.mesh.faces)], axis=1).max())
-    if not (math.isfinite(distance_m) and distance_m > needed):
+    used = surface.mesh.vertices[np.unique(surface.mesh.faces)]
+    needed = float((used @ views.toward.T).max())
+    if not (math.isfinite(views.distance) and views.distance > max(needed, 0.0)):
         raise InputError(
-            f"distance_m: {distance_m}; the target reaches {needed:.3g} m from its origin: allowed: more than that, "
-            "or None for the far field"
+            f"distance_m: {views.distance}; the target reaches {needed:.3g} m towards the radar: allowed: more than "
+            "that, or None for the far field"
         )

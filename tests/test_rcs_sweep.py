@@ -62,7 +62,7 @@ def test_the_floor_is_minus_120_dbsm_and_no_nan() -> None:
         ({"azimuth_deg": [[0.0, 1.0]]}, r"azimuth_deg"),
         ({"frequency_hz": 0.0}, r"frequency_hz: 0.*> 0"),
         ({"frequency_hz": -24e9}, r"frequency_hz"),
-        ({"distance_m": 0.05}, r"distance_m: 0\.05.*0\.0707 m"),
+        ({"azimuth_deg": 90.0, "distance_m": 0.04}, r"distance_m: 0\.04.*0\.05 m towards the radar"),
         ({"distance_m": -1.0}, r"distance_m: -1"),
         ({"distance_m": float("nan")}, r"distance_m: nan"),
         ({"max_bounces": 0}, r"max_bounces: 0.*1 to 10"),
