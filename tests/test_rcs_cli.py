@@ -213,7 +213,7 @@ def test_a_run_beyond_the_memory_of_the_machine_is_refused_even_then(
         ((*PLATE, "--pol", "VX"), "VX"),
         ((*PLATE, "--az", "1:2"), "--az 1:2"),
         ((*PLATE, "--material", "stell"), "unknown material"),
-        ((*PLATE, "--distance-m", "0.01"), "distance_m"),
+        ((*PLATE, "--az", "90", "--distance-m", "0.01"), "distance_m"),
         ((*PLATE, "--max-bounces", "0"), "max_bounces"),
         ((*PLATE, "--rays-per-wavelength", "-1"), "rays"),
         ((*PLATE, "--target-error-db", "-1"), "--target-error-db"),

@@ -221,7 +221,7 @@ def test_tag_sky_reflects_nothing():
     ("arguments", "message"),
     [
         ({"rays": 50}, "at least 100"),
-        ({"max_bounces": 2}, "max_bounces"),
+        ({"max_bounces": 6}, "max_bounces"),
         ({"max_bounces": 0}, "max_bounces"),
         ({"radar": "rear"}, "no radar 'rear'"),
         ({"backend": "cudda"}, "did you mean 'cuda'"),
