@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,7 +14,6 @@ from ..config.materials import MaterialTable
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
 from ..errors import InputError
-from ..paths import Paths
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
 from ..scene.motion import BodyState
@@ -23,9 +21,10 @@ from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
 from .backend import Backend, choose_backend
-from .bounces import MIRROR_M2, trace_paths
 from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
+from .launches import Launch, launch_directions
+from .mirrors import bounced_paths, image_launches
 
 __all__ = ["trace"]
 
@@ -36,37 +35,6 @@ MOST_BOUNCES = 5
 Columns: TypeAlias = dict[str, NDArray[Any]]
 #: Slack of the visibility test of a point target [m].
 _POINT_SLACK_M = 1e-3
-
-
-@dataclass(frozen=True)
-class _Launch:
-    """Cells, and the generator of the random numbers that belong to each, whatever it will hit."""
-
-    cells: Cells
-    generator: np.random.Generator
-
-    def draw(self) -> tuple[ComplexArray, FloatArray]:
-        """Return (n,) unit-power complex Gaussian and (n, 2) uniform numbers in [-1, 1]."""
-        n = len(self.cells)
-        gauss = self.generator.standard_normal((n, 2))
-        gauss *= np.sqrt(0.5)
-        return gauss.view(np.complex128)[:, 0], self.generator.uniform(-1.0, 1.0, (n, 2))
-
-
-def _directions(launches: list[_Launch]) -> NDArray[np.float32]:
-    """Return (3, n) float32 directions of all cells of all launches."""
-    total = sum(len(launch.cells) for launch in launches)
-    directions = np.empty((3, total), dtype=np.float32)
-    start = 0
-    for launch in launches:
-        part = directions[:, start : start + len(launch.cells)]
-
-        def fill(rows: slice, part: NDArray[np.float32] = part, cells: Cells = launch.cells) -> None:
-            part[:, rows] = cells.directions_of(rows).T
-
-        map_blocks(fill, len(launch.cells))
-        start += len(launch.cells)
-    return directions
 
 
 def trace(
@@ -139,8 +107,8 @@ def trace(
     bounced = None
     if max_bounces > 1:
         wavenumber = 2.0 * np.pi / profile.wavelength_m
-        image = _images(world, caster, aimed, run_seed, frame, mount.name)
-        bounced = _bounced(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
+        image = image_launches(world, caster, aimed, run_seed, frame, mount.name)
+        bounced = bounced_paths(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
     return Scatterers(
         **columns,
         paths=bounced,
@@ -154,16 +122,16 @@ def trace(
     )
 
 
-def _aims(world: World, seed: int, frame: int, radar: str) -> dict[int, _Launch]:
+def _aims(world: World, seed: int, frame: int, radar: str) -> dict[int, Launch]:
     """Return the launches of the bodies that have rays of their own, by body."""
     return {b: launch for b in range(len(world.bodies)) if (launch := _aim(world, b, seed, frame, radar))}
 
 
 def _cast(
-    world: World, caster: RayCaster, launches: list[_Launch], aimed: list[int]
+    world: World, caster: RayCaster, launches: list[Launch], aimed: list[int]
 ) -> tuple[list[IntArray], list[IntArray]]:
     """Return the face that each cell of each launch hits, and the cells that count; the first launch is the grid."""
-    face = caster.cast(_directions(launches))
+    face = caster.cast(launch_directions(launches))
     parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
     # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
     # what else there is, and no solid angle of an object counts twice.
@@ -171,84 +139,6 @@ def _cast(
     hits = [np.flatnonzero((parts[0] >= 0) & ~own[parts[0]])]
     hits += [np.flatnonzero((p >= 0) & (world.face_body[p] == b)) for b, p in zip(aimed, parts[1:], strict=True)]
     return parts, hits
-
-
-@dataclass(frozen=True)
-class _Image:
-    """Rays at the mirror image of a body in a plane."""
-
-    body: int
-    plane: int
-    launch: _Launch
-
-
-def _images(
-    world: World, caster: RayCaster, aimed: dict[int, _Launch], seed: int, frame: int, radar: str
-) -> list[_Image]:
-    """Return launches at the mirror images of aimed bodies, in the large planes that show them to the radar."""
-    large = np.flatnonzero(world.face_patch >= MIRROR_M2)
-    _, pick = np.unique(world.face_plane[large], return_index=True)
-    face = large[pick]
-    images = []
-    for body in aimed:
-        item = world.bodies[body]
-        points = world.vertices[world.vertex_start[body] : world.vertex_start[body + 1]]
-        mirrors = face[world.face_body[face] != body]
-        normal, offset = world.face_normal[mirrors], world.face_offset[mirrors]
-        box = np.stack(np.meshgrid(*np.stack([points.min(axis=0), points.max(axis=0)], axis=1)), axis=-1).reshape(-1, 3)
-        probes = np.concatenate([box.mean(axis=0, keepdims=True), box])
-        height = probes @ normal.T - offset  # of each probe above each plane; the radar is at -offset
-        seen = probes[:, None] - 2.0 * height[:, :, None] * normal
-        both = height * -offset > 0
-        rays = np.ascontiguousarray(seen.reshape(-1, 3).T / np.linalg.norm(seen.reshape(-1, 3), axis=1), np.float32)
-        hit = caster.cast(rays).reshape(both.shape)
-        shown = both & (hit >= 0) & (world.face_plane[hit] == world.face_plane[mirrors])
-        for k in np.flatnonzero(shown.any(axis=0)).tolist():
-            generator = frame_generator(seed, frame, radar, f"image {item.object_id} {item.source.name} {k}")
-            above = points @ normal[k] - offset[k]
-            mirrored = points - 2.0 * above[:, None] * normal[k]
-            cells = aimed_cells(mirrored, item.source.aim or 0, generator.uniform(-0.5, 0.5, 2))
-            if cells is not None:
-                images.append(_Image(body, int(world.face_plane[mirrors[k]]), _Launch(cells, generator)))
-    return images
-
-
-def _bounced(
-    world: World,
-    caster: RayCaster,
-    launches: list[_Launch],
-    parts: list[IntArray],
-    hits: list[IntArray],
-    aimed: list[int],
-    images: list[_Image],
-    max_bounces: int,
-    wavenumber: float,
-) -> Paths:
-    """Return the paths over several surfaces, each seen by one launch only.
-
-    What shows an aimed body in its second hit, in a plane that has rays of its own for that, is left to them.
-    """
-    taken = {(image.plane, image.body) for image in images}
-
-    def not_taken(first: IntArray, second: IntArray) -> BoolArray:
-        keep = np.ones(len(first), dtype=bool)
-        for plane, body in taken:
-            keep &= (world.face_plane[first] != plane) | (world.face_body[second] != body)
-        return keep
-
-    found = [
-        trace_paths(world, caster, launch.cells, part[hit], hit, max_bounces, wavenumber, not_taken)
-        for launch, part, hit in zip(launches, parts, hits, strict=True)
-    ]
-    for image in images:
-        face = caster.cast(_directions([image.launch]))
-        hit = np.flatnonzero((face >= 0) & (world.face_plane[face] == image.plane))
-
-        def shown(first: IntArray, second: IntArray, body: int = image.body) -> BoolArray:
-            return np.asarray(world.face_body[second] == body)
-
-        found.append(trace_paths(world, caster, image.launch.cells, face[hit], hit, max_bounces, wavenumber, shown))
-    return Paths.join(found)
 
 
 @functools.lru_cache(maxsize=4)
@@ -284,13 +174,13 @@ def _prepared(scene: Scene, mount: Placed, time: float, backend: Backend) -> tup
     return world, caster
 
 
-def _launch_pattern(profile: RadarProfile, rays: int, seed: int, frame: int, radar: str) -> _Launch:
+def _launch_pattern(profile: RadarProfile, rays: int, seed: int, frame: int, radar: str) -> Launch:
     shift = frame_generator(seed, frame, radar, "rays").uniform(-0.5, 0.5, 2)
     cells = turned(pattern_cells(profile.pattern, rays), shift)  # patterns are frozen, so they hash
-    return _Launch(cells, frame_generator(seed, frame, radar, "speckle"))
+    return Launch(cells, frame_generator(seed, frame, radar, "speckle"))
 
 
-def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> _Launch | None:
+def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> Launch | None:
     item = world.bodies[body]
     if item.source.aim is None:
         return None
@@ -298,7 +188,7 @@ def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> _Launch 
     generator = frame_generator(seed, frame, radar, stage)
     points = world.vertices[world.vertex_start[body] : world.vertex_start[body + 1]]
     cells = aimed_cells(points, item.source.aim, generator.uniform(-0.5, 0.5, 2))
-    return None if cells is None else _Launch(cells, generator)
+    return None if cells is None else Launch(cells, generator)
 
 
 def _all_rows(
