@@ -20,7 +20,8 @@ from common import Row, main, side_by_side
 
 import shenron_rt as srt
 from shenron_rt.tracing.backend import choose_backend, use_backend
-from shenron_rt.tracing.trace import _directions, _launch_pattern, _prepared
+from shenron_rt.tracing.launches import launch_directions
+from shenron_rt.tracing.trace import _launch_pattern, _prepared
 
 RAYS = 300_000
 
@@ -43,7 +44,7 @@ def measure() -> list[Row]:
     scene, profile = street(), srt.load_profile("awrl1432")
     mount = scene.radar()
     world, caster = _prepared(scene, mount, profile.frame_mid_s, choose_backend("auto"))
-    rays = _directions([_launch_pattern(profile, RAYS, 0, 0, mount.name)])
+    rays = launch_directions([_launch_pattern(profile, RAYS, 0, 0, mount.name)])
     normals = np.vstack([world.face_normal, np.zeros((1, 3))])  # a miss, -1, reads the last
     materials = np.append(world.face_material, np.uint16(0))
     with use_backend(caster.backend) as mi:
