@@ -12,7 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["map_blocks", "pool"]
+__all__ = ["BLOCK", "map_blocks", "pool"]
 
 Result = TypeVar("Result")
 

@@ -7,18 +7,18 @@ alone, never on the number of threads, so the order of every sum is fixed.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 
 from .._parallel import map_blocks
-from .._typing import FloatArray, IntArray
+from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .expansion import MAX_AMPLITUDE, rank
 from .signal import Clock, Points
 
-__all__ = ["COLUMNS", "Block", "Group", "cut", "group_points"]
+__all__ = ["Block", "Group", "cut", "group_points"]
 
 #: Costs in nanoseconds, of one core, to choose by: of a transform; per point of it, and per point and term; per term,
 #: per term and cell of its grid, and per term and sample; of the exact sum per point and sample.
@@ -26,8 +26,6 @@ COST_TRANSFORM, COST_POINT, COST_SPREAD = 0.8e6, 60.0, 40.0
 COST_TERM, COST_CELL, COST_SAMPLE, COST_EXACT = 0.2e6, 20.0, 15.0, 55.0
 #: Most points of one transform; bounds the memory.
 CHUNK = 1 << 17
-#: Points worked on at once: their arrays stay in the cache.
-COLUMNS = 8192
 
 
 @dataclass(frozen=True)
@@ -157,22 +155,22 @@ def group_points(
     """
     todo = np.arange(len(points))
     bound = _Bounds.of(clock, points, chirp_start_s, array_radius_m)
+    order = bound.delay_rate_cells()
     groups: list[Group] = []
     samples = len(chirp_start_s) * len(clock.sample_s)
     count = 1
     while len(todo) and count <= len(chirp_start_s):
         half = max(block.half_s for block in cut(clock, chirp_start_s, count))
-        curvature, neglected = bound.phases(clock, todo, half)
+        curvature, neglected = bound.phases(clock, half)
         fits = (curvature <= 2 * MAX_AMPLITUDE) & (neglected <= tolerance)
-        term = COST_TERM + COST_CELL * bound.cells(clock, todo, half) + COST_SAMPLE * samples / count
+        term = COST_TERM + COST_CELL * bound.cells(clock, half) + COST_SAMPLE * samples / count
         for rows, cost in _by_curvature(curvature[fits], 4 * tolerance, term):
             exact = COST_EXACT * samples * len(rows)
             groups.append(Group(count if count * cost < exact else 0, todo[fits][rows]))
-        todo = todo[~fits]
+        todo, bound = todo[~fits], bound.part(~fits)
         count = min(2 * count, len(chirp_start_s)) if count < len(chirp_start_s) else count + 1
     if len(todo):
         groups.append(Group(0, todo))
-    order = bound.delay_rate_cells()
     return [
         Group(g.blocks, rows)
         for g in groups
@@ -224,7 +222,7 @@ class _Bounds:
             rate = along / np.maximum(r, 1e-9)
             found[:, part] = curvature, speed, np.maximum(least, 1e-9), farthest, r, rate
 
-        map_blocks(fill, len(points), COLUMNS)
+        map_blocks(fill, len(points))
         return cls(*found)
 
     def delay_rate_cells(self) -> IntArray:
@@ -238,26 +236,30 @@ class _Bounds:
         found: IntArray = cells[0] * np.int16(256) + cells[1]
         return found
 
-    def cells(self, clock: Clock, rows: IntArray, half: float) -> float:
+    def part(self, rows: BoolArray) -> _Bounds:
+        """Return those of some echoes."""
+        return _Bounds(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    def cells(self, clock: Clock, half: float) -> float:
         """Estimate the cells of a grid, twice oversampled, from the spread of delay and rate."""
-        if not len(rows):
+        if not len(self.speed):
             return 0.0
         swept = 2 * clock.slope_hz_per_s / SPEED_OF_LIGHT * float(np.ptp(clock.sample_s))
-        fast = 2 * min(swept * float(np.ptp(self.farthest[rows])), len(clock.sample_s))
-        slow = 16 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed[rows].max()) * half
+        fast = 2 * min(swept * float(np.ptp(self.farthest)), len(clock.sample_s))
+        slow = 16 * clock.window_mid_hz / SPEED_OF_LIGHT * float(self.speed.max()) * half
         return (fast + 16) * (slow + 16)
 
-    def phases(self, clock: Clock, rows: IntArray, half: float) -> tuple[FloatArray, FloatArray]:
+    def phases(self, clock: Clock, half: float) -> tuple[FloatArray, FloatArray]:
         """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
-        curvature = np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * self.curvature[rows] * half**2
-        ratio = self.speed[rows] * half / self.least[rows]
+        curvature = np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * self.curvature * half**2
+        ratio = self.speed * half / self.least
         # fifth order and beyond: the leading Chebyshev coefficient of x^5 is 1/16
         series = np.where(ratio < 0.5, curvature * ratio**3 / 8, np.inf)
         # the quadratic delay term -k tau^2 / 2 beyond what moves into frequency, curvature and the fast x slow term
         chirpiness = clock.slope_hz_per_s / clock.window_mid_hz
-        moved = 2 * self.speed[rows] * half / SPEED_OF_LIGHT
+        moved = 2 * self.speed * half / SPEED_OF_LIGHT
         fast = chirpiness * float(np.ptp(clock.sample_s)) / 2
-        cross = chirpiness * (2 * self.farthest[rows] / SPEED_OF_LIGHT * fast + moved) * curvature
+        cross = chirpiness * (2 * self.farthest / SPEED_OF_LIGHT * fast + moved) * curvature
         late = np.pi / 2 * clock.slope_hz_per_s * moved**2 * fast
         return curvature, series + cross + late
 
@@ -271,7 +273,7 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
     if not len(phase):
         return []
     edges = np.unique(np.concatenate([np.geomspace(tolerance, 2 * MAX_AMPLITUDE, 24), np.linspace(0, 6, 13)]))
-    cell = np.concatenate(map_blocks(lambda part: np.searchsorted(edges, phase[part]), len(phase), COLUMNS))
+    cell = np.concatenate(map_blocks(lambda part: np.searchsorted(edges, phase[part]), len(phase)))
     counts = np.bincount(cell, minlength=len(edges) + 1)
     at = np.concatenate([[0], np.flatnonzero(counts) + 1])
     before = np.concatenate([[0], np.cumsum(counts)])

@@ -9,7 +9,7 @@ import numpy as np
 from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .blocks import COLUMNS, Block
+from .blocks import Block
 from .signal import Points
 
 __all__ = ["N_RESIDUALS", "MovedPoints", "Phases"]
@@ -46,11 +46,11 @@ class MovedPoints:
 
         def move(part: slice) -> None:
             chosen = rows[part]
-            v = vectors[1, :, part] = points.velocity[chosen].T
-            p = vectors[0, :, part] = points.position[chosen].T + time_s * v
+            v = vectors[1, :, part] = points.velocity.take(chosen, axis=0).T
+            p = vectors[0, :, part] = points.position.take(chosen, axis=0).T + time_s * v
             products[:, part] = (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0)
 
-        map_blocks(move, len(rows), COLUMNS)
+        map_blocks(move, len(rows))
         return cls(points.amplitude[rows], *vectors, *products)
 
     def __len__(self) -> int:

@@ -10,7 +10,7 @@ plus small terms: the targets s and (1 + k s / fc) T of the transform hold the c
 shift within a chirp, exactly. Every element pair has its own d0 and d1, so the near-field bend of the array and the
 change of angle during the frame are exact too. What bends tau within the block (Chebyshev orders 2 to 4 of T) and what
 is left of the quadratic delay term are residual phases of low rank; see ``expansion``. Where they are too large, the
-block is cut; see ``blocks``.
+block is cut; see ``blocks``. The transform itself is in ``gridding``.
 """
 
 from __future__ import annotations

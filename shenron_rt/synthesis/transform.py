@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from .._parallel import map_blocks
+from .._parallel import BLOCK, map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
-from .blocks import COLUMNS, Block
+from .blocks import Block
 from .delays import N_RESIDUALS, TAU, MovedPoints, Phases
 from .expansion import LowRank
 from .gridding import SPACING, Kernel, series
@@ -83,7 +83,7 @@ class Prepared:
             seen[:, part] = phases.residuals
             return *_ends(phases.fast), *_ends(phases.slow)
 
-        ends = np.array(map_blocks(look, len(moved), COLUMNS))
+        ends = np.array(map_blocks(look, len(moved)))
         first, last = ends[:, ::2].min(axis=0), ends[:, 1::2].max(axis=0)
         rows = _sample_rows(seen)
         few = moved.part(rows)
@@ -117,8 +117,8 @@ class Prepared:
         coarse = self.accuracy * TRANSFORM_SHARE >= SINGLE_ACCURACY
         dtype: DTypeLike = np.float32 if coarse else np.float64
         parameters: list[FloatArray] = [np.empty(n, dtype=dtype) for _ in self.used]
-        for first in range(0, n, COLUMNS):
-            part = slice(first, first + COLUMNS)
+        for first in range(0, n, BLOCK):
+            part = slice(first, first + BLOCK)
             back = self.points.part(part).range_derivatives(rx_m, order)
             phases = Phases.of(self.block, [a + b for a, b in zip(self.to_tx[:, part], back, strict=True)], self.used)
             fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
