@@ -46,9 +46,12 @@ class MovedPoints:
 
         def move(part: slice) -> None:
             chosen = rows[part]
-            v = vectors[1, :, part] = points.velocity.take(chosen, axis=0).T
-            p = vectors[0, :, part] = points.position.take(chosen, axis=0).T + time_s * v
-            products[:, part] = (p * p).sum(axis=0), (p * v).sum(axis=0), (v * v).sum(axis=0)
+            p, v = vectors[:, :, part]
+            v[:] = points.velocity.take(chosen, axis=0).T
+            np.multiply(v, time_s, out=p)
+            p += points.position.take(chosen, axis=0).T
+            for found, a, b in zip(products[:, part], (p, p, v), (p, v, v), strict=True):
+                np.einsum("iq,iq->q", a, b, out=found)
 
         map_blocks(move, len(rows))
         return cls(points.amplitude[rows], *vectors, *products)
