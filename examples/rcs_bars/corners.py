@@ -92,7 +92,7 @@ def table_cuts(run: Run, name: str, column_of: Callable[[str], str], cross: bool
     cuts = []
     for cut, axis in (("az", "az_deg"), ("el", "el_deg")):
         table = columns(run.shared / f"reference/rcs/trihedral_{name}_{cut}.csv")
-        table = {key: column[run.thin(9)] for key, column in table.items()}
+        table = {key: column[run.thin(5 if cross else 9)] for key, column in table.items()}
         pols = ("HV",) if cross else ("VV", "HH")
         got = along(run, in_table_frame(kind, CUTS[name]), float(ghz[:-3]), table, pols)
         middle = int(np.abs(table[axis] - (45.0 if cut == "az" else TILT_DEG)).argmin())
