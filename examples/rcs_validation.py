@@ -37,8 +37,8 @@ def row(bar: Bar, figure: Figure, seconds: str) -> str:
     digits = ".1e" if unit == "" else ".3f" if unit == "dB" else ".2f"
     holds = "reported" if most is None else "yes" if figure.holds else "**no**"
     cells = (
-        bar.what,
-        bar.reference,
+        bar.what.replace("|", "\\|"),
+        bar.reference.replace("|", "\\|"),
         str(figure.limit),
         "" if most is None else f"{most:g} {unit}".strip(),
         f"{figure.value:{digits}} {unit}".strip(),
