@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._typing import FloatArray, IntArray
+from .surface import Surface
+from .views import Views
 
-__all__ = ["Cells", "Lattice"]
+__all__ = ["Cells", "Lattice", "covering"]
 
 #: Largest number that is looked up in a table (of 5 bytes each) and not found by sorting.
 _TABLE = 1 << 23
@@ -91,6 +93,40 @@ class Cells:
         where, column = np.divmod(points, width)
         number, row = np.divmod(where, height)
         return number, np.stack([column + low[0], row + low[1]], axis=1), corner.reshape(-1, 4)
+
+
+def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[FloatArray, IntArray]:
+    """Return square lattices that cover the silhouettes, shifted at random.
+
+    Parameters
+    ----------
+    surface : Surface
+    lit : Views
+    step : float
+        Side of a cell [m].
+    seed : int
+
+    Returns
+    -------
+    low : (a, 2) float
+        Lower left corner along H and V from the centre of the target [m].
+    counts : (a, 2) int
+        Columns and rows.
+    """
+    mesh = surface.mesh
+    points = mesh.vertices[np.unique(mesh.faces)] - surface.centre
+    x, y = points @ lit.horizontal.T, points @ lit.vertical.T
+    if lit.distance is not None:
+        # onto the plane through the centre, along rays from the radar
+        ahead = lit.toward @ surface.centre
+        away = points @ lit.toward.T
+        scale = (lit.distance - ahead) / np.maximum(lit.distance - ahead - away, 1e-9)
+        side = np.stack([lit.horizontal @ surface.centre, lit.vertical @ surface.centre])
+        x, y = (x + side[0]) * scale - side[0], (y + side[1]) * scale - side[1]
+    low, high = np.stack([x.min(axis=0), y.min(axis=0)], axis=1), np.stack([x.max(axis=0), y.max(axis=0)], axis=1)
+    shift = np.random.default_rng(seed).random((len(lit), 2))
+    low = low - (0.5 + 0.5 * shift) * step
+    return low, np.ceil((high - low) / step + 0.25).astype(np.int64)
 
 
 def _distinct(key: IntArray) -> tuple[IntArray, IntArray]:

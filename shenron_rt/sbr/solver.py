@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
 from .._parallel import map_blocks
-from .._typing import ComplexArray, FloatArray, IntArray, NDArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .cells import Cells, Lattice
+from .cells import Cells, Lattice, covering
 from .chain import Chain, sees, trace_chain
+from .facets import facet_echoes
 from .fields import Fields, fields_along
 from .polygon import polygon_integral
 from .rim import Pieces, Rim
+from .sums import by_view
 from .surface import Surface
 from .tubes import is_tube, tube_echoes
 from .views import Views
 
-__all__ = ["Settings", "scattered"]
+__all__ = ["CHUNK", "Settings", "scattered"]
 
 #: Cells worked on at once: bounds memory.
 CHUNK = 1 << 17
@@ -48,7 +50,12 @@ class Settings:
 
 
 def scattered(
-    surface: Surface, lit: Views, frequency_hz: FloatArray, settings: Settings, receivers: Views | None = None
+    surface: Surface,
+    lit: Views,
+    frequency_hz: FloatArray,
+    settings: Settings,
+    receivers: Views | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> ComplexArray:
     """Return the complex scattering amplitudes of a target.
 
@@ -61,6 +68,8 @@ def scattered(
     settings : Settings
     receivers : Views, optional
         Then ``lit`` is a single view.
+    progress : callable, optional
+        Is told the share that is done, in [0, 1].
 
     Returns
     -------
@@ -69,32 +78,19 @@ def scattered(
     """
     seen = lit if receivers is None else receivers
     total = np.zeros((len(frequency_hz), len(seen), 2, 2), dtype=np.complex128)
-    lattice, chunks = _lattice(surface, lit, settings)
-    for cells in chunks:
-        while len(cells):
-            cells = _level(surface, lit, receivers, frequency_hz, settings, lattice, cells, total)
+    done = facet_echoes(surface, lit, receivers, frequency_hz, settings.step, total)
+    if not (done.all() and (surface.convex or settings.max_bounces == 1)):
+        low, counts = covering(surface, lit, settings.step, settings.seed)
+        run = _Sum(surface, lit, receivers, frequency_hz, settings, Lattice(low, settings.step), done, total)
+        n, so_far = int(counts.prod(axis=1).sum()), 0
+        for cells in _chunks(counts):
+            run.add(cells)
+            so_far += len(cells)
+            if progress is not None:
+                progress(so_far / n)
     wavenumber = 2.0 * np.pi * frequency_hz / SPEED_OF_LIGHT
     total *= wavenumber[:, None, None, None] / (2.0 * np.sqrt(np.pi))
     return total
-
-
-def _lattice(surface: Surface, lit: Views, settings: Settings) -> tuple[Lattice, Iterator[Cells]]:
-    """Return lattices that cover the silhouettes, shifted at random, and their cells in chunks."""
-    mesh = surface.mesh
-    points = mesh.vertices[np.unique(mesh.faces)] - surface.centre
-    x, y = points @ lit.horizontal.T, points @ lit.vertical.T
-    if lit.distance is not None:
-        # onto the plane through the centre, along rays from the radar
-        ahead = lit.toward @ surface.centre
-        away = points @ lit.toward.T
-        scale = (lit.distance - ahead) / np.maximum(lit.distance - ahead - away, 1e-9)
-        side = np.stack([lit.horizontal @ surface.centre, lit.vertical @ surface.centre])
-        x, y = (x + side[0]) * scale - side[0], (y + side[1]) * scale - side[1]
-    low, high = np.stack([x.min(axis=0), y.min(axis=0)], axis=1), np.stack([x.max(axis=0), y.max(axis=0)], axis=1)
-    shift = np.random.default_rng(settings.seed).random((len(lit), 2))
-    low = low - (0.5 + 0.5 * shift) * settings.step
-    counts = np.ceil((high - low) / settings.step + 0.25).astype(np.int64)
-    return Lattice(low, settings.step), _chunks(counts)
 
 
 def _chunks(counts: IntArray) -> Iterator[Cells]:
@@ -121,79 +117,122 @@ def _join(parts: list[tuple[int, IntArray]]) -> Cells:
     return Cells(0, view, np.concatenate([ij for _, ij in parts]), np.zeros(len(view), dtype=np.int64))
 
 
-def _level(
-    surface: Surface,
-    lit: Views,
-    receivers: Views | None,
-    frequency_hz: FloatArray,
-    settings: Settings,
-    lattice: Lattice,
-    cells: Cells,
-    total: ComplexArray,
-) -> Cells:
-    """Add what the tubes among some cells send, and return the quarters of the rest (or nothing, at the last level)."""
-    view, ij, corner = cells.corners()
-    x, y = lattice.points(view, ij, cells.level)
-    rays = lit.launch(view, x, y, surface.centre, surface.radius)
-    chain = trace_chain(surface, lit, rays, settings.max_bounces, receivers is None)
-    shortest = SPEED_OF_LIGHT / float(frequency_hz.max())
-    found, pending = _sort(chain, cells, corner, shortest)
-    monostatic = receivers is None
-    rim = Rim(surface, lit, chain, settings.max_bounces, monostatic, lattice, cells.select(pending), corner[pending])
-    pieces, left = rim.cut(shortest, cells.level == settings.levels)
-    _add(surface, lit, receivers, frequency_hz, chain, corner, found, pieces, total)
-    return rim.cells.select(left).quartered()
+@dataclass(frozen=True, eq=False)
+class _Sum:
+    """What cells add to the amplitudes.
 
-
-def _sort(chain: Chain, cells: Cells, corner: IntArray, wavelength: float) -> tuple[list[IntArray], IntArray]:
-    """Return the cells that are tubes at each bounce, and those that need a closer look.
-
-    Sets ``cells.done`` of the latter.
+    Parameters
+    ----------
+    surface, lit, receivers, frequency_hz, settings
+        As of :func:`scattered`.
+    lattice : Lattice
+    by_facets : (a, g) bool
+        Smooth surfaces whose first bounce is in the amplitudes already, for every view of the receivers.
+    total : (f, a, 2, 2) complex
+        Is added to, but for the wavenumber.
     """
-    alive = np.arange(len(cells))
-    found, pending = [], []
-    for order, bounce in enumerate(chain.bounces):
-        rows = bounce.row_of[corner[alive]]
-        hits = (rows >= 0).sum(axis=1)
-        whole = np.flatnonzero(hits == 4)
-        tube = np.zeros(len(alive), dtype=bool)
-        tube[whole] = is_tube(bounce, rows[whole], wavelength, order == 0)
-        unclear = alive[(hits > 0) & ~tube]
-        cells.done[unclear] = np.maximum(cells.done[unclear], order)
-        pending.append(unclear)
-        alive = alive[tube]
-        found.append(alive[cells.done[alive] <= order])
-    return found, np.sort(np.concatenate(pending)) if pending else np.zeros(0, dtype=np.int64)
 
+    surface: Surface
+    lit: Views
+    receivers: Views | None
+    frequency_hz: FloatArray
+    settings: Settings
+    lattice: Lattice
+    by_facets: BoolArray
+    total: ComplexArray
 
-def _add(
-    surface: Surface,
-    lit: Views,
-    receivers: Views | None,
-    frequency_hz: FloatArray,
-    chain: Chain,
-    corner: IntArray,
-    found: list[IntArray],
-    pieces: Pieces,
-    total: ComplexArray,
-) -> None:
-    fields: list[Fields] = []
-    for number, frequency in enumerate(frequency_hz.tolist()):
-        k = 2.0 * np.pi * frequency / SPEED_OF_LIGHT
-        if not fields or not surface.conducts:
-            fields = fields_along(surface, lit, chain, frequency)
-        for order in range(len(chain.bounces)):
-            for seen, view, free in _receptions(surface, lit, receivers, chain, order):
-                here = lit, seen, chain, order, fields[order], view, free
+    def add(self, cells: Cells) -> None:
+        """Add some cells: the tubes among them, and the quarters of the rest in the same way."""
+        waiting = [cells]
+        while waiting:
+            left = self._level(waiting.pop())
+            waiting += [left.select(np.arange(i, min(i + CHUNK, len(left)))) for i in range(0, len(left), CHUNK)]
 
-                def tubes(rows: slice, here: _Here = here, k: float = k, cell: IntArray = found[order]) -> ComplexArray:
-                    return _of_tubes(*here, corner[cell[rows]], k)
+    def _level(self, cells: Cells) -> Cells:
+        """Add what the tubes among cells of a level send, and return the quarters of the others, if they have any."""
+        view, ij, corner = cells.corners()
+        x, y = self.lattice.points(view, ij, cells.level)
+        surface, most = self.surface, self.settings.max_bounces
+        rays = self.lit.launch(view, x, y, surface.centre, surface.radius)
+        monostatic = self.receivers is None
+        chain = trace_chain(surface, self.lit, rays, most, monostatic)
+        shortest = SPEED_OF_LIGHT / float(self.frequency_hz.max())
+        found, pending = self._sort(chain, cells, corner, shortest)
+        rim = Rim(surface, self.lit, chain, most, monostatic, self.lattice, cells.select(pending), corner[pending])
+        pieces, left = rim.cut(shortest, cells.level == self.settings.levels)
+        self._echoes(chain, corner, found, pieces)
+        return rim.cells.select(left).quartered()
 
-                def rims(rows: slice, here: _Here = here, k: float = k) -> ComplexArray:
-                    return _of_pieces(*here, pieces.select(rows), k)
+    def _sort(
+        self, chain: Chain, cells: Cells, corner: IntArray, wavelength: float
+    ) -> tuple[list[IntArray], IntArray]:
+        """Return the cells that are tubes at each bounce, and those that need a closer look.
 
-                for part in (*map_blocks(tubes, len(found[order])), *map_blocks(rims, len(pieces))):
-                    total[number] += part
+        Sets ``cells.done`` of the latter.
+        """
+        alive = np.arange(len(cells))
+        found, pending = [], []
+        for order, bounce in enumerate(chain.bounces):
+            rows = bounce.row_of[corner[alive]]
+            hits = (rows >= 0).sum(axis=1)
+            whole = np.flatnonzero(hits == 4)
+            tube = np.zeros(len(alive), dtype=bool)
+            tube[whole] = is_tube(bounce, rows[whole], wavelength, order == 0)
+            unclear = alive[(hits > 0) & ~tube]
+            cells.done[unclear] = np.maximum(cells.done[unclear], order)
+            if order == 0:
+                unclear = unclear[self._matters(chain)[corner[unclear]].any(axis=1)]
+            pending.append(unclear)
+            alive = alive[tube]
+            found.append(alive[cells.done[alive] <= order])
+        return found, np.sort(np.concatenate(pending)) if pending else np.zeros(0, dtype=np.int64)
+
+    def _matters(self, chain: Chain) -> BoolArray:
+        """Return (n_rays,) whether a ray has hits that are not by facets already."""
+        first = chain.bounces[0]
+        by_facets = self.by_facets if self.receivers is None else self.by_facets.all(axis=0, keepdims=True)
+        matters = np.zeros(len(chain.rays), dtype=bool)
+        matters[first.ray] = ~by_facets[chain.rays.view[first.ray], self.surface.group[first.face]]
+        if len(chain.bounces) > 1:
+            matters |= chain.bounces[1].row_of >= 0
+        return matters
+
+    def _echoes(self, chain: Chain, corner: IntArray, found: list[IntArray], pieces: Pieces) -> None:
+        fields: list[Fields] = []
+        for number, frequency in enumerate(self.frequency_hz.tolist()):
+            k = 2.0 * np.pi * frequency / SPEED_OF_LIGHT
+            if not fields or not self.surface.conducts:
+                fields = fields_along(self.surface, self.lit, chain, frequency)
+            for order in range(len(chain.bounces)):
+                for seen, view, free in self._receptions(chain, order):
+                    here = self.lit, seen, chain, order, fields[order], view, free
+
+                    def tubes(rows: slice, here: _Here = here, k: float = k, cell: IntArray = found[order]) -> ComplexArray:
+                        return _of_tubes(*here, corner[cell[rows]], k)
+
+                    def rims(rows: slice, here: _Here = here, k: float = k) -> ComplexArray:
+                        return _of_pieces(*here, pieces.select(rows), k)
+
+                    for part in (*map_blocks(tubes, len(found[order])), *map_blocks(rims, len(pieces))):
+                        self.total[number] += part
+
+    def _receptions(self, chain: Chain, order: int) -> Iterator[tuple[Views, IntArray, FloatArray]]:
+        """Yield the receivers, the row of each hit in them, and whether it is seen from there and counts."""
+        bounce, surface = chain.bounces[order], self.surface
+        if self.receivers is None:
+            view = chain.rays.view[bounce.ray]
+            free = bounce.free.astype(np.float64)
+            if order == 0:
+                free[self.by_facets[view, surface.group[bounce.face]]] = 0.0
+            yield self.lit, view, free
+            return
+        lifted = bounce.position + surface.lift * bounce.normal
+        for number in range(len(self.receivers)):
+            view = np.full(len(bounce), number)
+            free = sees(surface, self.receivers, lifted, bounce.normal, view).astype(np.float64)
+            if order == 0:
+                free[self.by_facets[number, surface.group[bounce.face]]] = 0.0
+            yield self.receivers, view, free
 
 
 #: Illumination, reception, rays, order of the bounce, its fields, the row of each hit in the receivers, whether it is
@@ -211,7 +250,7 @@ def _of_tubes(
         lit, seen, chain, order, rows, first, fields, at, free[rows].mean(axis=1)
     )
     lobe = np.sinc(k / (2.0 * np.pi) * along_u) * np.sinc(k / (2.0 * np.pi) * along_v)
-    return _by_view(strength, lobe * np.exp(-1j * k * path), at, len(seen))
+    return by_view(strength, lobe * np.exp(-1j * k * path), at, len(seen))
 
 
 def _of_pieces(
@@ -220,25 +259,4 @@ def _of_pieces(
 ) -> ComplexArray:  # fmt: skip
     echoes = pieces.echoes(lit, seen, chain, order, fields, view, free)
     lobe = polygon_integral(echoes.outline, k * echoes.gradient)
-    return _by_view(echoes.strength, lobe * np.exp(-1j * k * echoes.path), echoes.view, len(seen))
-
-
-def _receptions(
-    surface: Surface, lit: Views, receivers: Views | None, chain: Chain, order: int
-) -> Iterator[tuple[Views, IntArray, FloatArray]]:
-    """Yield the receivers, the row of each hit in them, and whether it sees them."""
-    bounce = chain.bounces[order]
-    if receivers is None:
-        yield lit, chain.rays.view[bounce.ray], bounce.free.astype(np.float64)
-        return
-    lifted = bounce.position + surface.lift * bounce.normal
-    for number in range(len(receivers)):
-        view = np.full(len(bounce), number)
-        yield receivers, view, sees(surface, receivers, lifted, bounce.normal, view).astype(np.float64)
-
-
-def _by_view(strength: NDArray[np.inexact], phasor: ComplexArray, view: IntArray, n: int) -> ComplexArray:
-    """Return (n, 2, 2) sums of echoes by view, in the order of the echoes."""
-    values = (strength.reshape(-1, 4) * phasor[:, None]).T
-    sums = [np.bincount(view, c.real, n) + 1j * np.bincount(view, c.imag, n) for c in np.ascontiguousarray(values)]
-    return np.stack(sums, axis=1).reshape(n, 2, 2)
+    return by_view(echoes.strength, lobe * np.exp(-1j * k * echoes.path), echoes.view, len(seen))

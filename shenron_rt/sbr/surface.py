@@ -20,6 +20,8 @@ SMOOTH_ANGLE = np.radians(30.0)
 #: How far above its surface a reflected ray starts, as a share of the size of the target: float32 coordinates, which
 #: the caster works in, are off by up to 6e-8 of it.
 _LIFT = 2e-6
+#: How far above a facet's plane its neighbours may rise on a convex body, as a share of the size of the target.
+_FLAT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,26 @@ class Surface:
         return smooth_groups(self.mesh, self.reflector)
 
     @functools.cached_property
+    def outward(self) -> int:
+        """1 or -1, the sign that turns ``normal`` outwards, where the body is closed and convex; 0 where it is not."""
+        a, b = self.mesh.adjacent
+        n, normal = self.mesh.n_faces, self.normal
+        if 2 * len(a) != 3 * n or not _one_piece(a, b, n):
+            return 0
+        middle = self.mesh.vertices[self.mesh.faces].mean(axis=1)
+        bend = np.concatenate([_dot(normal[a], middle[b] - middle[a]), _dot(normal[b], middle[a] - middle[b])])
+        for sign in (1, -1):  # a closed surface that bends inwards across every edge is that of a convex body
+            if (sign * bend <= _FLAT * self.radius).all():
+                return sign
+        return 0
+
+    @functools.cached_property
+    def convex(self) -> bool:
+        """Whether no facet can hide another: a closed convex body, or one flat face."""
+        reach = self.mesh.vertices[self.mesh.faces].reshape(-1, 3) @ self.normal[0] - self.offset[0]
+        return self.outward != 0 or bool((np.abs(reach) <= _FLAT * self.radius).all())
+
+    @functools.cached_property
     def caster(self) -> RayCaster:
         """The triangles about the centre, where float32 is finest."""
         return RayCaster(self.mesh.vertices - self.centre, self.mesh.faces, self.backend)
@@ -98,6 +120,19 @@ class Surface:
     def conducts(self) -> bool:
         """Whether every face is a smooth perfect conductor."""
         return all(r.coefficients is None and r.roughness_m == 0.0 for r in self.reflectors)
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
+def _one_piece(a: IntArray, b: IntArray, n: int) -> bool:
+    """Return whether n faces that meet in pairs hang together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
+    return bool(connected_components(graph, directed=False)[0] == 1)
 
 
 def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:

@@ -1,0 +1,92 @@
+"""Which facets a radar sees whole, which not at all, and which in part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .._typing import FloatArray, IntArray, NDArray
+from .chain import dot, sees
+from .subdivide import subdivided
+from .surface import Surface
+from .views import Views
+
+__all__ = ["HIDDEN", "PARTLY", "WHOLE", "Sight"]
+
+HIDDEN, WHOLE, PARTLY = 0, 1, 2
+#: Facets of a body that is not convex up to which every one is looked at, and rays a view for that, in cells of the
+#: lattice: beyond, looking would cost more than what it is for.
+_MOST_FACES, _MOST_RAYS = 5000, 4.0
+#: Rays a view that are always worth it.
+_FEW_RAYS = 4096
+#: How far from the middle of a facet towards its corners it is looked at.
+_INSET = 0.95
+
+
+class Sight:
+    """Looks at every facet of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    step : float
+        Something as wide as this that hides a facet is noticed [m].
+    """
+
+    def __init__(self, surface: Surface, step: float) -> None:
+        self._surface = surface
+        self._points, self._face = np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        self.possible = surface.convex
+        """Whether it can tell."""
+        if not surface.convex and surface.mesh.n_faces <= _MOST_FACES:
+            triangles = surface.mesh.vertices[surface.mesh.faces]
+            edge = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+            split = np.ceil(edge / step).astype(np.int64)
+            most = max(_MOST_RAYS * (2.0 * surface.radius / step) ** 2, _FEW_RAYS)
+            if (split.astype(np.float64) ** 2).sum() + 3 * len(split) <= most:
+                self.possible = True
+                self._points, self._face = _places(triangles, np.maximum(split, 1))
+
+    def blocks(self, views: Views, most: int) -> Iterator[tuple[slice, NDArray[np.int8]]]:
+        """Yield some views after the other, and (b, f) what they see of every facet; ``most`` bounds b f."""
+        size = max(1, most // max(self._surface.mesh.n_faces, len(self._face)))
+        for start in range(0, len(views), size):
+            rows = slice(start, min(start + size, len(views)))
+            yield rows, self.of(views.select(rows))
+
+    def of(self, views: Views) -> NDArray[np.int8]:
+        """Return (a, f) :data:`HIDDEN`, :data:`WHOLE` or :data:`PARTLY`."""
+        if self._surface.convex:
+            return self._of_convex(views)
+        surface, n = self._surface, len(self._face)
+        view = np.repeat(np.arange(len(views)), n)
+        points = np.tile(self._points, (len(views), 1))
+        normal = np.tile(surface.normal[self._face], (len(views), 1))
+        normal *= np.where(dot(views.seen_from(points, view)[0], normal) < 0.0, -1.0, 1.0)[:, None]
+        seen = sees(surface, views, points + surface.lift * normal, normal, view).reshape(len(views), n)
+        first = np.flatnonzero(np.diff(self._face, prepend=-1))
+        count = np.add.reduceat(seen, first, axis=1, dtype=np.int64)
+        whole = count == np.diff(np.append(first, n))
+        return np.where(whole, WHOLE, np.where(count == 0, HIDDEN, PARTLY)).astype(np.int8)
+
+    def _of_convex(self, views: Views) -> NDArray[np.int8]:
+        """Return what a convex body shows: the facets whose outer side the radar is on; of a flat one, all."""
+        surface = self._surface
+        if surface.outward == 0:
+            return np.full((len(views), surface.mesh.n_faces), WHOLE, dtype=np.int8)
+        height = views.toward @ surface.normal.T
+        if views.distance is not None:
+            height = views.distance * height - surface.offset
+        return np.where(surface.outward * height > 0.0, WHOLE, HIDDEN).astype(np.int8)
+
+
+def _places(triangles: FloatArray, split: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return points on triangles and the row of each, sorted by it: middles of their parts, and near their corners."""
+    parts, face = subdivided(triangles, split)
+    middle = triangles.mean(axis=1, keepdims=True)
+    corners = middle + _INSET * (triangles - middle)
+    points = np.concatenate([parts.mean(axis=1), corners.reshape(-1, 3)])
+    row = np.concatenate([face, np.repeat(np.arange(len(triangles)), 3)])
+    order = np.argsort(row, kind="stable")
+    return points[order], row[order]
