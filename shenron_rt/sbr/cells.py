@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import FloatArray, IntArray
+from .._typing import BoolArray, FloatArray, IntArray
 from .surface import Surface
 from .views import Views
 
@@ -14,6 +14,8 @@ __all__ = ["Cells", "Lattice", "covering"]
 
 #: Largest number that is looked up in a table (of 5 bytes each) and not found by sorting.
 _TABLE = 1 << 23
+#: Vertices of a target up to which cells are refined at them.
+_MOST_TIPS = 256
 #: Corners of a cell, in order around it (u to the right, v up).
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -28,16 +30,32 @@ class Lattice:
         Lower left corner, along H and V from the centre of the target [m].
     step : float
         Side of a cell of level 0 [m].
+    tips : (a, t, 2) float
+        Where vertices of the target appear [m]; none on targets with many.
     """
 
     low: FloatArray
     step: float
+    tips: FloatArray
 
     def points(self, view: IntArray, ij: IntArray, level: int) -> tuple[FloatArray, FloatArray]:
         """Return (n,) coordinates of lattice points of a level [m]."""
         size = self.step / 2**level
         low = self.low[view]
         return low[:, 0] + ij[:, 0] * size, low[:, 1] + ij[:, 1] * size
+
+    def holds_tip(self, cells: Cells) -> BoolArray:
+        """Return (n,) whether a vertex appears in a cell: no corner of it need see the tip of a sharp triangle."""
+        if not self.tips.size or not len(cells):
+            return np.zeros(len(cells), dtype=bool)
+        ij = np.floor((self.tips - self.low[:, None, :]) / (self.step / 2**cells.level)).astype(np.int64)
+        low = cells.ij.min(axis=0)
+        width, height = (cells.ij.max(axis=0) - low + 1).tolist()
+        inside = ((ij >= low) & (ij < low + np.array([width, height]))).all(axis=2)
+        view = np.broadcast_to(np.arange(len(self.low))[:, None], inside.shape)[inside]
+        at, own = ij[inside] - low, cells.ij - low
+        tips = (view * height + at[:, 1]) * width + at[:, 0]
+        return np.isin((cells.view.astype(np.int64) * height + own[:, 1]) * width + own[:, 0], tips)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +113,8 @@ class Cells:
         return number, np.stack([column + low[0], row + low[1]], axis=1), corner.reshape(-1, 4)
 
 
-def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[FloatArray, IntArray]:
-    """Return square lattices that cover the silhouettes, shifted at random.
+def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[Lattice, IntArray]:
+    """Return square lattices that cover the silhouettes, shifted at random, and their numbers of columns and rows.
 
     Parameters
     ----------
@@ -108,8 +126,7 @@ def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[Floa
 
     Returns
     -------
-    low : (a, 2) float
-        Lower left corner along H and V from the centre of the target [m].
+    Lattice
     counts : (a, 2) int
         Columns and rows.
     """
@@ -126,7 +143,8 @@ def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[Floa
     low, high = np.stack([x.min(axis=0), y.min(axis=0)], axis=1), np.stack([x.max(axis=0), y.max(axis=0)], axis=1)
     shift = np.random.default_rng(seed).random((len(lit), 2))
     low = low - (0.5 + 0.5 * shift) * step
-    return low, np.ceil((high - low) / step + 0.25).astype(np.int64)
+    tips = np.stack([x.T, y.T], axis=2) if len(points) <= _MOST_TIPS else np.zeros((len(lit), 0, 2))
+    return Lattice(low, step, tips), np.ceil((high - low) / step + 0.25).astype(np.int64)
 
 
 def _distinct(key: IntArray) -> tuple[IntArray, IntArray]:

@@ -1,4 +1,7 @@
-"""Which facets a radar sees whole, which not at all, and which in part."""
+"""Which facets a radar sees whole, which not at all, and which in part.
+
+A round body is lit as far as its own normals, not those of its facets, are turned to the light.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,10 @@ from .subdivide import subdivided
 from .surface import Surface
 from .views import Views
 
-__all__ = ["HIDDEN", "PARTLY", "WHOLE", "Sight"]
+__all__ = ["HIDDEN", "LIMB", "PARTLY", "WHOLE", "Sight", "heights"]
 
-HIDDEN, WHOLE, PARTLY = 0, 1, 2
+#: Not seen, seen whole, turned away in part at the limb of a convex body, hidden in part by something else.
+HIDDEN, WHOLE, LIMB, PARTLY = 0, 1, 2, 3
 #: Facets of a body that is not convex up to which every one is looked at, and rays a view for that, in cells of the
 #: lattice: beyond, looking would cost more than what it is for.
 _MOST_FACES, _MOST_RAYS = 5000, 4.0
@@ -50,13 +54,13 @@ class Sight:
 
     def blocks(self, views: Views, most: int) -> Iterator[tuple[slice, NDArray[np.int8]]]:
         """Yield some views after the other, and (b, f) what they see of every facet; ``most`` bounds b f."""
-        size = max(1, most // max(self._surface.mesh.n_faces, len(self._face)))
+        size = max(1, most // max(3 * self._surface.mesh.n_faces, len(self._face)))
         for start in range(0, len(views), size):
             rows = slice(start, min(start + size, len(views)))
             yield rows, self.of(views.select(rows))
 
     def of(self, views: Views) -> NDArray[np.int8]:
-        """Return (a, f) :data:`HIDDEN`, :data:`WHOLE` or :data:`PARTLY`."""
+        """Return (a, f) :data:`HIDDEN`, :data:`WHOLE`, :data:`LIMB` or :data:`PARTLY`."""
         if self._surface.convex:
             return self._of_convex(views)
         surface, n = self._surface, len(self._face)
@@ -71,14 +75,31 @@ class Sight:
         return np.where(whole, WHOLE, np.where(count == 0, HIDDEN, PARTLY)).astype(np.int8)
 
     def _of_convex(self, views: Views) -> NDArray[np.int8]:
-        """Return what a convex body shows: the facets whose outer side the radar is on; of a flat one, all."""
+        """Return what a convex body shows: the facets with a corner that is turned to the radar; of a flat one, all."""
         surface = self._surface
         if surface.outward == 0:
             return np.full((len(views), surface.mesh.n_faces), WHOLE, dtype=np.int8)
-        height = views.toward @ surface.normal.T
-        if views.distance is not None:
-            height = views.distance * height - surface.offset
-        return np.where(surface.outward * height > 0.0, WHOLE, HIDDEN).astype(np.int8)
+        corners, normal = surface.mesh.vertices[surface.mesh.faces], surface.corner_normal
+        view = np.arange(len(views))[:, None]
+        up = np.stack([heights(views, view, corners[:, k], normal[:, k]) for k in range(3)]) > 0.0
+        return np.where(up.all(axis=0), WHOLE, np.where(up.any(axis=0), LIMB, HIDDEN)).astype(np.int8)
+
+
+def heights(views: Views, view: IntArray, points: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return how far normals at points are turned to radars, in any unit; negative is away.
+
+    Parameters
+    ----------
+    views : Views
+    view : (a, 1) or (n,) int
+        For every point, or one each.
+    points, normal : (n, 3) float
+    """
+    toward = views.toward[view]
+    height = toward[..., 0] * normal[:, 0] + toward[..., 1] * normal[:, 1] + toward[..., 2] * normal[:, 2]
+    if views.distance is not None:
+        height = views.distance * height - dot(points, normal)
+    return np.asarray(height)
 
 
 def _places(triangles: FloatArray, split: IntArray) -> tuple[FloatArray, IntArray]:

@@ -80,8 +80,8 @@ def scattered(
     total = np.zeros((len(frequency_hz), len(seen), 2, 2), dtype=np.complex128)
     done = facet_echoes(surface, lit, receivers, frequency_hz, settings.step, total)
     if not (done.all() and (surface.convex or settings.max_bounces == 1)):
-        low, counts = covering(surface, lit, settings.step, settings.seed)
-        run = _Sum(surface, lit, receivers, frequency_hz, settings, Lattice(low, settings.step), done, total)
+        lattice, counts = covering(surface, lit, settings.step, settings.seed)
+        run = _Sum(surface, lit, receivers, frequency_hz, settings, lattice, done, total)
         n, so_far = int(counts.prod(axis=1).sum()), 0
         for cells in _chunks(counts):
             run.add(cells)
@@ -163,9 +163,7 @@ class _Sum:
         self._echoes(chain, corner, found, pieces)
         return rim.cells.select(left).quartered()
 
-    def _sort(
-        self, chain: Chain, cells: Cells, corner: IntArray, wavelength: float
-    ) -> tuple[list[IntArray], IntArray]:
+    def _sort(self, chain: Chain, cells: Cells, corner: IntArray, wavelength: float) -> tuple[list[IntArray], IntArray]:
         """Return the cells that are tubes at each bounce, and those that need a closer look.
 
         Sets ``cells.done`` of the latter.
@@ -178,9 +176,12 @@ class _Sum:
             whole = np.flatnonzero(hits == 4)
             tube = np.zeros(len(alive), dtype=bool)
             tube[whole] = is_tube(bounce, rows[whole], wavelength, order == 0)
-            unclear = alive[(hits > 0) & ~tube]
-            cells.done[unclear] = np.maximum(cells.done[unclear], order)
+            touched = hits > 0
             if order == 0:
+                touched |= self.lattice.holds_tip(cells)
+            unclear = alive[touched & ~tube]
+            cells.done[unclear] = np.maximum(cells.done[unclear], order)
+            if order == 0 and self.settings.max_bounces == 1:
                 unclear = unclear[self._matters(chain)[corner[unclear]].any(axis=1)]
             pending.append(unclear)
             alive = alive[tube]
@@ -190,11 +191,9 @@ class _Sum:
     def _matters(self, chain: Chain) -> BoolArray:
         """Return (n_rays,) whether a ray has hits that are not by facets already."""
         first = chain.bounces[0]
-        by_facets = self.by_facets if self.receivers is None else self.by_facets.all(axis=0, keepdims=True)
+        by_facets = self.by_facets if self.receivers is None else np.atleast_2d(self.by_facets.all(axis=0))
         matters = np.zeros(len(chain.rays), dtype=bool)
         matters[first.ray] = ~by_facets[chain.rays.view[first.ray], self.surface.group[first.face]]
-        if len(chain.bounces) > 1:
-            matters |= chain.bounces[1].row_of >= 0
         return matters
 
     def _echoes(self, chain: Chain, corner: IntArray, found: list[IntArray], pieces: Pieces) -> None:
@@ -207,7 +206,9 @@ class _Sum:
                 for seen, view, free in self._receptions(chain, order):
                     here = self.lit, seen, chain, order, fields[order], view, free
 
-                    def tubes(rows: slice, here: _Here = here, k: float = k, cell: IntArray = found[order]) -> ComplexArray:
+                    def tubes(
+                        rows: slice, here: _Here = here, k: float = k, cell: IntArray = found[order]
+                    ) -> ComplexArray:
                         return _of_tubes(*here, corner[cell[rows]], k)
 
                     def rims(rows: slice, here: _Here = here, k: float = k) -> ComplexArray:

@@ -101,6 +101,21 @@ class Surface:
         return 0
 
     @functools.cached_property
+    def corner_normal(self) -> FloatArray:
+        """(f, 3, 3) outward unit normals at the corners of a convex body.
+
+        Averaged by area over the faces of the smooth surface that meet there.
+        """
+        corner, group = self.mesh.corner, self.group
+        _, place = np.unique(corner * (int(group.max()) + 1) + group[:, None], return_inverse=True)
+        place = place.reshape(-1, 3)
+        weight = self.outward * self.normal * self.mesh.face_area[:, None]
+        total = [np.bincount(place.ravel(), np.repeat(w, 3)) for w in weight.T]
+        normal: FloatArray = np.stack(total, axis=1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        return np.asarray(normal[place])
+
+    @functools.cached_property
     def convex(self) -> bool:
         """Whether no facet can hide another: a closed convex body, or one flat face."""
         reach = self.mesh.vertices[self.mesh.faces].reshape(-1, 3) @ self.normal[0] - self.offset[0]

@@ -132,19 +132,27 @@ class TaggedMesh:
         return np.array([int(p.tag) for p in self.parts], dtype=np.uint8)[self.part]
 
     @cached_property
+    def corner(self) -> IntArray:
+        """(f, 3) numbers of the places the corners are at; vertices at one place count as one."""
+        scale = max(float(np.abs(self.vertices).max()), 1e-9)
+        place = np.round(self.vertices / scale * 1e8).astype(np.int64)
+        order = np.lexsort(place.T)
+        new = (np.diff(place[order], axis=0, prepend=place[order[:1]]) != 0).any(axis=1)
+        number = np.empty(len(place), dtype=np.int64)
+        number[order] = np.cumsum(new)
+        return number[self.faces]
+
+    @cached_property
     def adjacent(self) -> tuple[IntArray, IntArray]:
         """Pairs of faces that share an edge, (m,) and (m,); vertices at one place count as one.
 
         Faces that meet three or more at an edge are paired one after the other.
         """
-        scale = max(float(np.abs(self.vertices).max()), 1e-9)
-        place = np.round(self.vertices / scale * 1e8).astype(np.int64)
-        _, vertex = np.unique(place, axis=0, return_inverse=True)
-        corner = vertex.reshape(-1)[self.faces]
-        ends = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-        order = np.lexsort((ends[:, 1], ends[:, 0]))
-        face = np.repeat(np.arange(self.n_faces), 3)[order]
-        shared = np.flatnonzero((ends[order[1:]] == ends[order[:-1]]).all(axis=1))
+        a, b = self.corner, np.roll(self.corner, -1, axis=1)
+        edge = (np.minimum(a, b) * (int(self.corner.max()) + 1) + np.maximum(a, b)).ravel()
+        order = np.argsort(edge, kind="stable")
+        face = (order // 3).astype(np.int64)
+        shared = np.flatnonzero(np.diff(edge[order]) == 0)
         return face[shared], face[shared + 1]
 
     @cached_property
