@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shenron_rt.physics import box_amplitude
+from shenron_rt.physics import box_amplitude, plate_amplitude
 from shenron_rt.scene.mesh import TaggedMesh, build_mesh
 from shenron_rt.scene.shapes import make_shape
 
@@ -24,6 +24,8 @@ INCH = 0.0254
 HEXAGON = np.array([(-0.5, -0.4), (0.23, -0.4), (0.5, -0.13), (0.5, 0.13), (0.23, 0.4), (-0.5, 0.4)])
 DEPTH, BOX_LENGTH = 0.325, 0.4
 ALMOND_LENGTH = 0.252374
+#: Below the peak, where the table of scores counts exact physical optics as blind [dB].
+NULL_DB = 70.0
 TABLES = {"IIA": "plate_IIA_zero_thickness", "IIB": "plate_IIB_thin_measured", "IIISA": "camera_box_IIISA",
           "IIIA": "almond_IIIA", "IIISB": "camera_box_IIISB_cobra"}  # fmt: skip
 POLARIZATION = {"V": "VV", "H": "HH"}
@@ -77,11 +79,16 @@ def target(name: str, shared: Path) -> Any:
 
 
 def reference_rows(run: Run, name: str, kind: str, ghz: float, pol: str) -> dict[str, np.ndarray]:
-    """Return a curve of the suite's tables, without the plate's edge: physical optics has nothing there."""
+    """Return a curve of the suite's tables, of the plate without what is beyond physical optics.
+
+    Its edge and its nulls, more than 70 dB below the peak, are left out: the table of scores counts no such samples.
+    """
     table = columns(run.shared / f"reference/emcc/{TABLES[name]}.csv")
     curve = rows(table, kind=kind, freq_ghz=ghz, pol=pol)
-    keep = curve["phi_deg"] != 90.0 if name == "IIA" else slice(None)
-    return {key: column[keep] for key, column in curve.items()}
+    if name != "IIA":
+        return curve
+    po = dbsm(plate_amplitude(10.5 * INCH, 6 * INCH, wavelength(ghz), np.radians(curve["phi_deg"])))
+    return {key: column[po >= po.max() - NULL_DB] for key, column in curve.items()}
 
 
 def against(run: Run, name: str, kind: str, ghz: float, pol: str, bounces: int = 1) -> list[Cut]:
