@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
@@ -144,6 +144,7 @@ def sweep_rcs(
     units: str | float = "m",
     seed: int = 0,
     backend: str = "auto",
+    progress: Callable[[float], None] | None = None,
 ) -> RcsSweep:
     """Compute the radar cross section of one target by shooting and bouncing rays with physical optics.
 
@@ -177,6 +178,8 @@ def sweep_rcs(
         Of the shift of the lattice of rays.
     backend : str
         ``"auto"``, ``"cuda"``, ``"llvm"`` or ``"scalar"``.
+    progress : callable, optional
+        Is told the share of the rays that is done, in [0, 1].
 
     Returns
     -------
@@ -229,15 +232,9 @@ def sweep_rcs(
     step = SPEED_OF_LIGHT / float(frequency.max()) / density
     levels = next(n for width, n in _LEVELS if 2.0 * surface.radius <= width * step)
     settings = Settings(step, levels, max_bounces, seed)
-    if bistatic is None:
-        matrix = scattered(surface, views, frequency, settings)
-    else:
-        place = np.radians(_axis("bistatic", bistatic))
-        if len(place) != 2:
-            raise InputError(f"bistatic: (azimuth_deg, elevation_deg) is needed, got {bistatic!r}")
-        lit = Views(place[:1], place[1:], distance_m)
-        _check_distance(lit, surface)
-        matrix = scattered(surface, lit, frequency, settings, views)
+    lit, receivers = (views, None) if bistatic is None else (_transmitter(bistatic, distance_m), views)
+    _check_distance(lit, surface)
+    matrix = scattered(surface, lit, frequency, settings, receivers, progress)
     pick = [("VH".index(p[0]), "VH".index(p[1])) for p in wanted]
     amplitude = np.stack([matrix[:, :, r, t] for r, t in pick], axis=2)
     return RcsSweep(
@@ -260,6 +257,13 @@ def _axis(name: str, values: ArrayLike) -> FloatArray:
     if axis.ndim != 1 or not len(axis) or not np.isfinite(axis).all():
         raise InputError(f"{name}: a finite number or a list of them is needed, got {values!r}")
     return axis
+
+
+def _transmitter(bistatic: tuple[float, float], distance: float | None) -> Views:
+    place = np.radians(_axis("bistatic", bistatic))
+    if len(place) != 2:
+        raise InputError(f"bistatic: (azimuth_deg, elevation_deg) is needed, got {bistatic!r}")
+    return Views(place[:1], place[1:], distance)
 
 
 def _polarizations(wanted: str | Sequence[str]) -> tuple[str, ...]:

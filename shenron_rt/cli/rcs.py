@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import functools
 import re
-import threading
 import time as clock
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -211,56 +209,37 @@ def _sweep(
     from ..rcs import sweep_rcs
     from ..turntable.convergence import converge
 
-    if not (study.converge or study.target_error_db is not None):
-        with _timed(planned.seconds, "sweeping", quiet=quiet):
-            return replace(sweep_rcs(mesh, **options.arguments()), target=name), None
-    with _timed(planned.seconds, "sweeping", quiet=quiet) as now:
+    with progress(100, "sweeping", quiet=quiet) as step:
+        bar = _Bar(step, f"sweeping, % done of about {planned.seconds:.0f} s")
+        if not (study.converge or study.target_error_db is not None):
+            return replace(sweep_rcs(mesh, **options.arguments(), progress=bar.show), target=name), None
 
         def before(density: float, expected: float | None) -> None:
-            now.restart(expected or planned.seconds, f"{density:g} rays per wavelength")
+            bar.restart(f"{density:g} rays per wavelength, % done of about {expected or planned.seconds:.0f} s")
 
         report = converge(
             mesh, target_error_db=study.target_error_db, max_seconds=study.max_seconds, before=before,
-            **options.arguments(),
+            progress=bar.show, **options.arguments(),
         )  # fmt: skip
     return replace(report.finest, target=name), report
 
 
-@dataclass
-class _Clock:
-    """What a bar is filling towards: seconds that are expected, since when, and for what."""
+class _Bar:
+    """A progress bar that is told shares."""
 
-    expected: float
-    what: str
-    since: float = field(default_factory=clock.perf_counter)
+    def __init__(self, step: Callable[..., None], what: str) -> None:
+        self._step, self._what, self._shown = step, what, 0
 
-    def restart(self, expected: float, what: str) -> None:
+    def restart(self, what: str) -> None:
         """Begin a next part."""
-        self.expected, self.what, self.since = expected, what, clock.perf_counter()
+        self._what = what
+        self.show(0.0)
 
-
-@contextmanager
-def _timed(expected: float, what: str, *, quiet: bool) -> Iterator[_Clock]:
-    """Show a bar that fills with the share of the planned time: a sweep is one call, and says nothing on the way."""
-    now = _Clock(expected, what)
-    done = threading.Event()
-    with progress(100, what, quiet=quiet) as step:
-
-        def tick() -> None:
-            shown = 0
-            while not done.wait(0.25):
-                elapsed = clock.perf_counter() - now.since
-                share = min(99, int(100 * elapsed / max(now.expected, 1e-3)))
-                step(f"{now.what}, % of the planned {now.expected:.0f} s", advance=share - shown)
-                shown = share
-
-        ticker = threading.Thread(target=tick, daemon=True)
-        ticker.start()
-        try:
-            yield now
-        finally:
-            done.set()
-            ticker.join()
+    def show(self, share: float) -> None:
+        """Fill the bar so far."""
+        percent = int(100.0 * share)
+        self._step(self._what, advance=percent - self._shown)
+        self._shown = percent
 
 
 def _label(name: str) -> str:
