@@ -189,16 +189,20 @@ def test_a_plate_converges_and_the_report_says_so() -> None:
     assert report.finest is report.sweeps[-1]
 
 
+#: Two bounces: the ray spacing enters.
+CORNER = "dihedral:a=0.05,b=0.05,h=0.05"
+
+
 def test_a_target_error_ends_at_the_target_or_at_the_limit_and_says_which() -> None:
-    plate: dict[str, Any] = {"frequency_hz": 24e9, "azimuth_deg": AZ[::5], "max_bounces": 1}
+    plate: dict[str, Any] = {"frequency_hz": 24e9, "azimuth_deg": AZ[::5], "max_bounces": 2}
     met = converge("plate:0.05x0.05", target_error_db=0.5, **plate)
     assert met.reached
     assert len(met.sweeps) == 2
-    missed = converge("plate:0.05x0.05", target_error_db=1e-9, most_doublings=2, **plate)
+    missed = converge(CORNER, target_error_db=1e-9, most_doublings=2, **plate)
     assert missed.reached is False
     assert [s.rays_per_wavelength for s in missed.sweeps] == [1.0, 2.0, 4.0]
     assert "2 doublings are the limit" in missed.says
-    late = converge("plate:0.05x0.05", target_error_db=1e-9, max_seconds=1e-3, **plate)
+    late = converge(CORNER, target_error_db=1e-9, max_seconds=1e-3, **plate)
     assert len(late.sweeps) == 2
     assert "beyond" in late.stopped
     with pytest.raises(InputError, match="target_error_db"):
@@ -214,17 +218,17 @@ def test_cells_are_those_of_the_silhouette() -> None:
     assert np.abs(cells - expected).max() <= 102  # rounding may add a row
 
 
-def _box() -> dict[str, Any]:
+def _dihedral() -> dict[str, Any]:
     return {"frequency_hz": 24e9, "azimuth_deg": np.arange(-30.0, 30.1, 0.5), "elevation_deg": [0.0, 20.0]}
 
 
 def test_planned_time_is_within_a_factor_of_three_of_the_run() -> None:
-    mesh = srt.make_shape("box:0.6x0.5x0.4")
+    mesh = srt.make_shape("dihedral:a=0.6,b=0.6,h=0.5")
     ratios = []
     for _ in range(2):  # a machine shared with others may stall one of them
-        plan = plan_sweep(mesh, **_box())
+        plan = plan_sweep(mesh, **_dihedral())
         began = time.perf_counter()
-        srt.sweep_rcs(mesh, **_box())
+        srt.sweep_rcs(mesh, **_dihedral())
         ratios.append(plan.seconds / (time.perf_counter() - began))
     assert plan.aspects == 242
     assert plan.frequencies == 1
@@ -232,16 +236,17 @@ def test_planned_time_is_within_a_factor_of_three_of_the_run() -> None:
     assert min(abs(np.log(r)) for r in ratios) < np.log(3.0), ratios
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is read from /proc")
 def test_planned_memory_is_within_a_factor_of_three_of_the_run() -> None:
-    mesh = srt.make_shape("box:0.6x0.5x0.4")
+    mesh = srt.make_shape("dihedral:a=0.6,b=0.6,h=0.5")
     code = (
-        "import numpy, resource, shenron_rt as srt\n"
-        "srt.sweep_rcs('box:0.6x0.5x0.4', frequency_hz=24e9, azimuth_deg=numpy.arange(-30.0, 30.1, 0.5), "
+        "import numpy, pathlib, re, shenron_rt as srt\n"
+        "srt.sweep_rcs('dihedral:a=0.6,b=0.6,h=0.5', frequency_hz=24e9, azimuth_deg=numpy.arange(-30.0, 30.1, 0.5), "
         "elevation_deg=[0.0, 20.0])\n"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)"
+        "print(re.search('VmHWM: *([0-9]+)', pathlib.Path('/proc/self/status').read_text().expandtabs()).group(1))"
     )
-    used = int(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
-    assert used / 3 < plan_sweep(mesh, **_box()).memory_bytes < 3 * used
+    used = int(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) * 1024
+    assert used / 3 < plan_sweep(mesh, **_dihedral()).memory_bytes < 3 * used
 
 
 def test_plans_add_up_along_frequency() -> None:
