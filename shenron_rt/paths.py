@@ -130,6 +130,12 @@ class Paths:
         return np.asarray(np.linalg.norm(self.legs, axis=2).sum(axis=1))
 
     @cached_property
+    def there(self) -> FloatArray:
+        """(n,) length from the radar to the hit that radiates [m]."""
+        length = np.linalg.norm(self.legs, axis=2)
+        return np.asarray(np.where(np.arange(length.shape[1]) <= self.radiates[:, None], length, 0.0).sum(axis=1))
+
+    @cached_property
     def departure(self) -> FloatArray:
         """(n, 3) unit vectors in which the paths leave the radar."""
         return _unit(self.point[:, 0])
@@ -150,6 +156,29 @@ class Paths:
         length = np.linalg.norm(legs, axis=2, keepdims=True)
         unit = np.divide(legs, length, out=np.zeros_like(legs), where=length > 0)
         return np.asarray(0.5 * np.einsum("nbi,nbi->n", self.velocity, unit[:, :-1] - unit[:, 1:]))
+
+    @cached_property
+    def image_velocity(self) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) velocities of the images of the hit that radiates [m/s]: as transmitters see it, and as receivers do.
+
+        The image of a point of velocity v in a plane of normal n that moves with V has v - 2 n (n . (v - V)). Along
+        the line of sight that holds for mirrors that turn, too; the turning of their images about the radar is left
+        out.
+        """
+        source = self.velocity[np.arange(len(self)), self.radiates]
+        out, back = source, source
+        columns = range(self.object_id.shape[1])
+        for order in reversed(columns):
+            out = np.where((order < self.radiates)[:, None], self._imaged(out, order), out)
+        for order in columns:
+            behind = (order > self.radiates) & self.hit[:, order]
+            back = np.where(behind[:, None], self._imaged(back, order), back)
+        return np.asarray(out), np.asarray(back)
+
+    def _imaged(self, velocity: FloatArray, order: int) -> FloatArray:
+        normal = self.normal[:, order]
+        across = np.einsum("ni,ni->n", normal, velocity - self.velocity[:, order])
+        return np.asarray(velocity - 2.0 * across[:, None] * normal)
 
     @cached_property
     def owner(self) -> tuple[IntArray, IntArray]:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Returns", "illuminate"]
 
+#: Columns that only echoes over several surfaces need.
+_OPTIONAL = ("departure", "departure_velocity")
+
 
 @dataclass(frozen=True)
 class Returns:
@@ -51,7 +54,10 @@ class Returns:
     weather : Weather or None
         Whose attenuation the amplitudes have; ``None`` is none.
     departure : (n, 3) float or None
-        Like ``position``, at the same distance, in the direction in which the wave left; ``None``: the same.
+        Where transmitters see the echo: the image of its source in the mirrors on the way there. Receivers see it in
+        the direction of ``position``, over the rest of the way ``2 abs(position)``. ``None``: both at ``position``.
+    departure_velocity : (n, 3) float or None
+        Of that point, like ``velocity``; ``None``: along its line of sight, as fast as ``position`` goes along its own.
     """
 
     amplitude: ComplexArray
@@ -66,13 +72,15 @@ class Returns:
     model: str = "physical"
     weather: Weather | None = None
     departure: FloatArray | None = None
+    departure_velocity: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.amplitude)
         for name in ("object_id", "tag", "coherent", "bounces", "scatterer"):
             if np.shape(getattr(self, name)) != (n,):
                 raise InputError(f"Returns.{name}: shape ({n},) is needed, got {np.shape(getattr(self, name))}")
-        for name in ("position", "velocity", *(() if self.departure is None else ("departure",))):
+        optional = [n for n in _OPTIONAL if getattr(self, n) is not None]
+        for name in ("position", "velocity", *optional):
             if np.shape(getattr(self, name)) != (n, 3):
                 raise InputError(f"Returns.{name}: shape ({n}, 3) is needed, got {np.shape(getattr(self, name))}")
 
@@ -126,14 +134,13 @@ class Returns:
         ------
         NotFoundError, InputError
         """
-        names = [f.name for f in fields(cls) if f.name not in ("weather", "departure")]
+        names = [f.name for f in fields(cls) if f.name not in ("weather", *_OPTIONAL)]
         arrays: dict[str, Any] = load_npz(path, names)
         values = {name: arrays[name] for name in names}
         values |= {"center_hz": float(values["center_hz"]), "model": str(values["model"])}
         if "weather" in arrays:
             values["weather"] = Weather.from_array(arrays["weather"])
-        if "departure" in arrays:
-            values["departure"] = arrays["departure"]
+        values |= {name: arrays[name] for name in _OPTIONAL if name in arrays}
         return cls(**values)
 
 

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._parallel import map_blocks
-from .._typing import ComplexArray, FloatArray, IntArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from ..constants import FOUR_PI_CUBED, SPEED_OF_LIGHT
 from ..paths import Paths
 from ..physics.roughness import coherent_factor
+from ..returns import Returns
 from ..sbr.fields import radiated, reflected_field
-from ..scatterers import Weather
+from ..scatterers import Scatterers, Weather
 from .link import link_amplitude
 
 if TYPE_CHECKING:
     from ..config.materials import Material, MaterialTable
     from ..config.profile import RadarProfile
 
-__all__ = ["path_amplitude", "tube_phase_integral"]
+__all__ = ["path_amplitude", "tube_phase_integral", "with_paths"]
 
 #: Largest phase over a tube that is integrated; beyond it the stationary point alone counts [rad].
 _INTEGRATED = 40.0
@@ -29,6 +31,55 @@ _INTEGRATED = 40.0
 _NODES = 24
 #: Nodes that are enough for the phase of a tube as narrow as the wavelength [rad].
 _FEW_NODES, _NARROW = 8, 6.0
+
+
+def with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile, materials: MaterialTable) -> Returns:
+    """Append the echoes of the ways over several surfaces to those of first surfaces, all in the radar frame."""
+    paths = scatterers.paths
+    if paths is None or not len(paths):
+        return returns
+    antenna = profile.antenna.polarization
+    arguments = (scatterers.material_names, materials, profile, scatterers.weather)
+    forth = path_amplitude(paths, *arguments, antenna)
+    turned = np.flatnonzero(paths.two_way)
+    back = path_amplitude(paths.select(turned), *arguments, antenna[::-1])
+    row = np.concatenate([np.arange(len(paths)), turned])
+    amplitude = np.concatenate([forth, back])
+    paths = paths.select(row)
+    reverse = (np.arange(len(row)) >= len(forth))[:, None]
+    arrival = np.where(reverse, paths.departure, paths.arrival)
+    departure = np.where(reverse, paths.arrival, paths.departure)
+    place, velocity = _apparent(paths, reverse, arrival)
+    outward, outward_velocity = _outward(paths, reverse, departure)
+    object_id, tag = paths.owner
+    return replace(
+        returns,
+        amplitude=np.concatenate([returns.amplitude, amplitude]),
+        position=np.concatenate([returns.position, place]),
+        velocity=np.concatenate([returns.velocity, velocity]),
+        object_id=np.concatenate([returns.object_id, object_id]),
+        tag=np.concatenate([returns.tag, tag]),
+        coherent=np.concatenate([returns.coherent, np.ones(len(row), dtype=bool)]),
+        bounces=np.concatenate([returns.bounces, paths.count]),
+        scatterer=np.concatenate([returns.scatterer, -1 - row]),
+        departure=np.concatenate([returns.position, outward]),
+        departure_velocity=np.concatenate([returns.velocity, outward_velocity]),
+    )
+
+
+def _apparent(paths: Paths, reverse: BoolArray, arrival: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where echoes appear to receivers, at half their way, and how that point moves [m, m/s]."""
+    half = 0.5 * paths.way[:, None]
+    back = np.where(reverse, paths.there[:, None], (paths.way - paths.there)[:, None])
+    image = np.where(reverse, *paths.image_velocity)
+    across = image - np.einsum("ni,ni->n", image, arrival)[:, None] * arrival
+    return half * arrival, paths.range_rate[:, None] * arrival + half / back * across
+
+
+def _outward(paths: Paths, reverse: BoolArray, departure: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where transmitters see the sources of echoes, and how those images move [m, m/s]."""
+    there = np.where(reverse, (paths.way - paths.there)[:, None], paths.there[:, None])
+    return there * departure, np.where(reverse, *paths.image_velocity[::-1])
 
 
 def path_amplitude(
@@ -65,8 +116,7 @@ def path_amplitude(
         part = paths.select(rows)
         legs = part.legs
         length = np.linalg.norm(legs, axis=2)
-        there = np.where(np.arange(length.shape[1]) <= part.radiates[:, None], length, 0.0).sum(axis=1)
-        back = length.sum(axis=1) - there
+        there, back = part.there, part.way - part.there
         unit = legs / np.maximum(length, 1e-12)[:, :, None]
         strength = _strength(part, unit, worn, profile.center_hz, polarization)
         integral = tube_phase_integral(part.slope, part.curvature, wavenumber)

@@ -24,7 +24,7 @@ from ..physics.fresnel import backscatter_reflection
 from ..randomness import frame_generator
 from ..returns import Returns
 from ..scatterers import Scatterers
-from .bounced import path_amplitude
+from .bounced import with_paths
 from .glint import points_sigma0
 from .link import link_amplitude
 from .plane import across_share, swapped
@@ -85,7 +85,7 @@ def physical_returns(scatterers: Scatterers, profile: RadarProfile, materials: M
 
     blocks = map_blocks(block, len(scatterers)) or [block(slice(0, 0))]
     echoes = [e for kind in (True, False) for b in blocks for e in b if e.coherent == kind]
-    return _with_paths(_assemble(scatterers, echoes, profile), scatterers, profile, materials)
+    return with_paths(_assemble(scatterers, echoes, profile), scatterers, profile, materials)
 
 
 def _echoes(
@@ -314,36 +314,4 @@ def _assemble(scatterers: Scatterers, echoes: list[_Echo], profile: RadarProfile
         center_hz=profile.center_hz,
         model="physical",
         weather=scatterers.weather,
-    )
-
-
-def _with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile, materials: MaterialTable) -> Returns:
-    """Append the echoes of the ways over several surfaces."""
-    paths = scatterers.paths
-    if paths is None or not len(paths):
-        return returns
-    antenna = profile.antenna.polarization
-    arguments = (scatterers.material_names, materials, profile, scatterers.weather)
-    forth = path_amplitude(paths, *arguments, antenna)
-    turned = np.flatnonzero(paths.two_way)
-    back = path_amplitude(paths.select(turned), *arguments, antenna[::-1])
-    row = np.concatenate([np.arange(len(paths)), turned])
-    amplitude = np.concatenate([forth, back])
-    paths = paths.select(row)
-    reverse = (np.arange(len(row)) >= len(forth))[:, None]
-    arrival = np.where(reverse, paths.departure, paths.arrival)
-    departure = np.where(reverse, paths.arrival, paths.departure)
-    half, rate = 0.5 * paths.way[:, None], paths.range_rate[:, None]
-    object_id, tag = paths.owner
-    return replace(
-        returns,
-        amplitude=np.concatenate([returns.amplitude, amplitude]),
-        position=np.concatenate([returns.position, half * arrival]),
-        velocity=np.concatenate([returns.velocity, rate * arrival]),
-        object_id=np.concatenate([returns.object_id, object_id]),
-        tag=np.concatenate([returns.tag, tag]),
-        coherent=np.concatenate([returns.coherent, np.ones(len(row), dtype=bool)]),
-        bounces=np.concatenate([returns.bounces, paths.count]),
-        scatterer=np.concatenate([returns.scatterer, -1 - row]),
-        departure=np.concatenate([returns.position, half * departure]),
     )

@@ -7,7 +7,7 @@ alone, never on the number of threads, so the order of every sum is fixed.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -201,6 +201,11 @@ class _Bounds:
 
     @classmethod
     def of(cls, clock: Clock, points: Points, chirp_start_s: FloatArray, radius: float) -> _Bounds:
+        """Bound one leg; of two that differ, what is worse for either."""
+        if points.sent is not None:
+            legs = [cls.of(clock, p, chirp_start_s, radius) for p in (replace(points, sent=None), points.sent)]
+            merge = {"least": np.minimum}
+            return cls(*(merge.get(f.name, np.maximum)(*(getattr(b, f.name) for b in legs)) for f in fields(cls)))
         first = float(chirp_start_s.min() + clock.sample_s[0]) - clock.frame_mid_s
         last = float(chirp_start_s.max() + clock.sample_s[-1]) - clock.frame_mid_s
         found = np.empty((6, len(points)))

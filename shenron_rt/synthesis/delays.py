@@ -29,6 +29,8 @@ class MovedPoints:
     position, velocity : (3, n) float
     range_square, along, speed_square : (n,) float
         p.p, p.v and v.v.
+    sent : MovedPoints or None
+        As transmitters see them; ``None``: the same.
     """
 
     amplitude: ComplexArray
@@ -37,6 +39,7 @@ class MovedPoints:
     range_square: FloatArray
     along: FloatArray
     speed_square: FloatArray
+    sent: MovedPoints | None = None
 
     @classmethod
     def at(cls, points: Points, rows: IntArray, time_s: float) -> MovedPoints:
@@ -54,7 +57,9 @@ class MovedPoints:
                 np.einsum("iq,iq->q", a, b, out=found)
 
         map_blocks(move, len(rows))
-        return cls(points.amplitude[rows], *vectors, *products)
+        sent = None if points.sent is None else cls.at(points.sent, rows, time_s)
+        (position, velocity), (square, along, speed) = vectors, products
+        return cls(points.amplitude[rows], position, velocity, square, along, speed, sent)
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -68,7 +73,13 @@ class MovedPoints:
             self.range_square[columns],
             self.along[columns],
             self.speed_square[columns],
+            None if self.sent is None else self.sent.part(columns),
         )
+
+    @property
+    def outward(self) -> MovedPoints:
+        """The echoes as transmitters see them."""
+        return self if self.sent is None else self.sent
 
     def range_derivatives(self, element_m: FloatArray, order: int) -> list[FloatArray]:
         """Return the distance to an element and its time derivatives up to ``order`` (2 to 4).

@@ -37,7 +37,8 @@ def direct_field(
 
     Notes
     -----
-    tau = (abs(p(T) - tx) + abs(p(T) - rx)) / c with p(T) = position + velocity T and T = chirp start + t - mid-frame.
+    tau = (abs(p(T) - tx) + abs(p(T) - rx)) / c with p(T) = position + velocity T and T = chirp start + t - mid-frame;
+    where an echo has legs of its own, transmitters see ``points.sent``.
     Cost: about 50 ns a term on one core.
     """
     t = clock.sample_s
@@ -49,7 +50,7 @@ def direct_field(
         n_points = max(1, BLOCK_TERMS // time.size)
         for begin in range(0, len(points), n_points):
             part = points[begin : begin + n_points]
-            to_tx = _distance(part, tx_m, time)
+            to_tx = _distance(part.outward, tx_m, time)
             for j, rx in enumerate(rx_m):
                 tau = (to_tx + _distance(part, rx, time)) / SPEED_OF_LIGHT
                 cycles = (clock.carrier_hz + clock.slope_hz_per_s * (t - tau / 2)) * tau

@@ -63,10 +63,12 @@ def _field(
 ) -> ComplexArray:
     out = np.zeros((len(chirp_start_s), len(rx_m), len(clock.sample_s)), dtype=np.complex128)
     radius = float(max(np.linalg.norm(tx_m), np.linalg.norm(rx_m, axis=1).max()))
-    groups = group_points(clock, points, chirp_start_s, radius, NEGLECTED_SHARE * accuracy)
-    jobs = _jobs(accuracy, clock, points, groups, tx_m, rx_m, chirp_start_s)
-    for (chirps, receiver), part in _in_order(jobs, workers):
-        out[chirps, receiver] += part
+    # echoes of first surfaces are summed as if no others were there
+    for legs in points.by_legs():
+        groups = group_points(clock, legs, chirp_start_s, radius, NEGLECTED_SHARE * accuracy)
+        jobs = _jobs(accuracy, clock, legs, groups, tx_m, rx_m, chirp_start_s)
+        for (chirps, receiver), part in _in_order(jobs, workers):
+            out[chirps, receiver] += part
     return out
 
 

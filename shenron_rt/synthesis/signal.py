@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,11 +23,15 @@ class Points:
     ----------
     amplitude : (n,) complex
     position, velocity : (n, 3) float
+        As receivers see them.
+    sent : Points or None
+        As transmitters see them; ``None``: the same.
     """
 
     amplitude: ComplexArray
     position: FloatArray
     velocity: FloatArray
+    sent: Points | None = None
 
     @classmethod
     def from_returns(cls, returns: Returns) -> Points:
@@ -41,8 +45,13 @@ class Points:
         amplitude = np.asarray(returns.amplitude, dtype=np.complex128)
         position = np.asarray(returns.position, dtype=np.float64)
         velocity = np.asarray(returns.velocity, dtype=np.float64)
-        for name, values in (("amplitude", amplitude), ("position", position), ("velocity", velocity)):
-            if np.isfinite(values).all():
+        away, leaving = (
+            None if v is None else np.asarray(v, dtype=np.float64)
+            for v in (returns.departure, returns.departure_velocity)
+        )
+        columns = {"position": position, "velocity": velocity, "departure": away, "departure_velocity": leaving}
+        for name, values in ({"amplitude": amplitude} | columns).items():
+            if values is None or np.isfinite(values).all():
                 continue
             bad = np.flatnonzero(~np.isfinite(np.atleast_2d(values.T)).all(axis=0))
             raise InputError(
@@ -50,6 +59,8 @@ class Points:
                 f"({values[bad[0]]}); finite numbers are needed"
             )
         points = cls(amplitude, position, velocity)
+        if away is not None:
+            points = _two_legs(points, away, leaving)
         heard = np.flatnonzero(amplitude)
         return points if len(heard) == len(amplitude) else points[heard]
 
@@ -57,7 +68,52 @@ class Points:
         return len(self.amplitude)
 
     def __getitem__(self, rows: slice | IntArray) -> Points:
-        return Points(self.amplitude[rows], self.position[rows], self.velocity[rows])
+        sent = None if self.sent is None else self.sent[rows]
+        return Points(self.amplitude[rows], self.position[rows], self.velocity[rows], sent)
+
+    @property
+    def outward(self) -> Points:
+        """The echoes as transmitters see them."""
+        return self if self.sent is None else self.sent
+
+    def by_legs(self) -> list[Points]:
+        """Return the echoes whose legs are the same, then, where there are any, those whose legs differ."""
+        if self.sent is None:
+            return [self]
+        same = np.all((self.sent.position == self.position) & (self.sent.velocity == self.velocity), axis=1)
+        return [replace(self[np.flatnonzero(same)], sent=None), self[np.flatnonzero(~same)]]
+
+
+def _two_legs(points: Points, departure: FloatArray, departure_velocity: FloatArray | None) -> Points:
+    """Tell the legs of echoes apart whose wave did not leave where it arrives; see :class:`Returns`."""
+    position, velocity = points.position, points.velocity
+    if departure_velocity is None:
+        rate = np.einsum("ij,ij->i", velocity, _unit(position))
+        same = np.all(departure == position, axis=1)[:, None]
+        departure_velocity = np.where(same, velocity, rate[:, None] * _unit(departure))
+    rows = np.flatnonzero(np.any((departure != position) | (departure_velocity != velocity), axis=1))
+    if not len(rows):
+        return points
+    here, moving, away, leaving = (a[rows] for a in (position, velocity, departure, departure_velocity))
+    toward, rate = _unit(here), np.einsum("ij,ij->i", moving, _unit(here))
+    half, there = np.linalg.norm(here, axis=1), np.linalg.norm(away, axis=1)
+    back = 2.0 * half - there
+    if np.any(back <= 0):
+        row = rows[int(np.argmax(back <= 0))]
+        raise InputError(
+            f"Returns.departure: row {row} is {np.linalg.norm(departure[row]):g} m away, which leaves nothing of the "
+            f"way 2 * {np.linalg.norm(position[row]):g} m; the way there must be shorter"
+        )
+    across = moving - rate[:, None] * toward
+    rest = 2.0 * rate - np.einsum("ij,ij->i", leaving, _unit(away))
+    position, velocity = position.copy(), velocity.copy()
+    position[rows] = back[:, None] * toward
+    velocity[rows] = rest[:, None] * toward + (back / half)[:, None] * across
+    return Points(points.amplitude, position, velocity, Points(points.amplitude, departure, departure_velocity))
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-12))
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class Prepared:
 
         def look(part: slice) -> tuple[float, ...]:
             points = moved.part(part)
-            to_tx[:, part] = points.range_derivatives(tx_m, 4)
+            to_tx[:, part] = points.outward.range_derivatives(tx_m, 4)
             phases = _phases(block, points, to_tx[:, part], probes[0], every)
             seen[:, part] = phases.residuals
             return *_ends(phases.fast), *_ends(phases.slow)

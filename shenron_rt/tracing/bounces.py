@@ -173,7 +173,7 @@ def _received(
         free = _reaches(world, caster, _lifted(tubes.points[-1], normal), eye)
     else:
         plane = plane[kept]
-        free, back = _reflected_back(world, caster, _lifted(tubes.points[-1], normal), eye, plane)
+        free, back = _reflected_back(world, caster, tubes.points[-1], normal, eye, plane)
         plane, back = plane[free], back[free]
     tubes, eye, normal = tubes.select(free), eye[free], normal[free]
     share = _share(world, tubes, normal, wavenumber)
@@ -201,15 +201,15 @@ def _reaches(world: World, caster: RayCaster, start: FloatArray, end: FloatArray
 
 
 def _reflected_back(
-    world: World, caster: RayCaster, start: FloatArray, image: FloatArray, face: IntArray
+    world: World, caster: RayCaster, start: FloatArray, side: FloatArray, image: FloatArray, face: IntArray
 ) -> tuple[IntArray, FloatArray]:
-    """Return which points see the radar in the planes of some faces, and (n, 3) where on them."""
+    """Return which points, lit on one side, see the radar in the planes of some faces, and (n, 3) where on them."""
     normal = world.face_normal[face]
     way = image - start
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (world.face_offset[face] - np.einsum("ij,ij->i", normal, start)) / np.einsum("ij,ij->i", normal, way)
     where = start + np.nan_to_num(share)[:, None] * way
-    seen = _cast(caster, start, way / np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None])
+    seen = _cast(caster, _lifted(start, side), way / np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None])
     shown = (share > 0) & (share < 1) & (seen >= 0) & (world.face_plane[seen] == world.face_plane[face])
     rows = np.flatnonzero(shown)
     towards = _facing(world, face[rows], where[rows])  # light from the radar arrives along ``where``
