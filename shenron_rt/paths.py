@@ -182,11 +182,16 @@ class Paths:
 
     @cached_property
     def owner(self) -> tuple[IntArray, IntArray]:
-        """(n,) object id and tag: of the last hit on an object that is not static (id 0), else of the last hit."""
+        """(n,) object id and tag: of the hit that radiates, unless it is static (id 0); then of the last that is not.
+
+        Where all are static: of the last hit.
+        """
         column = np.arange(self.object_id.shape[1])
-        named = np.where(self.hit & (self.object_id > 0), column, -1).max(axis=1)
-        pick = np.where(named >= 0, named, self.count.astype(np.int64) - 1)
-        row = np.arange(len(self))
+        named = self.hit & (self.object_id > 0)
+        last = np.where(named, column, -1).max(axis=1)
+        row, source = np.arange(len(self)), self.radiates.astype(np.int64)
+        pick = np.where(last >= 0, last, self.count.astype(np.int64) - 1)
+        pick = np.where(named[row, source], source, pick)
         return self.object_id[row, pick], self.tag[row, pick]
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from ._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
+from .chains import Chains
 from .constants import SPEED_OF_LIGHT
 from .errors import InputError
 from .io.npz import load_npz, save_npz
@@ -58,6 +59,8 @@ class Returns:
         the direction of ``position``, over the rest of the way ``2 abs(position)``. ``None``: both at ``position``.
     departure_velocity : (n, 3) float or None
         Of that point, like ``velocity``; ``None``: along its line of sight, as fast as ``position`` goes along its own.
+    chains : Chains or None
+        The objects that each echo met on its way; ``None``: first surfaces only.
     """
 
     amplitude: ComplexArray
@@ -73,6 +76,7 @@ class Returns:
     weather: Weather | None = None
     departure: FloatArray | None = None
     departure_velocity: FloatArray | None = None
+    chains: Chains | None = None
 
     def __post_init__(self) -> None:
         n = len(self.amplitude)
@@ -83,6 +87,8 @@ class Returns:
         for name in ("position", "velocity", *optional):
             if np.shape(getattr(self, name)) != (n, 3):
                 raise InputError(f"Returns.{name}: shape ({n}, 3) is needed, got {np.shape(getattr(self, name))}")
+        if self.chains is not None and len(self.chains) != n:
+            raise InputError(f"Returns.chains: {n} echoes are needed, got {len(self.chains)}")
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -105,6 +111,24 @@ class Returns:
 
         return ShenronModel.parse(self.model).calibrated
 
+    @property
+    def chain(self) -> NDArray[Any]:
+        """(n,) str, the objects met from transmitter to receiver: ``"40>101"`` is radar, 40, 101, radar."""
+        if self.chains is not None:
+            return np.asarray(self.chains.names[self.chains.row])
+        ids, row = np.unique(self.object_id, return_inverse=True)
+        return np.asarray(ids.astype(np.str_)[row])
+
+    @property
+    def ghost(self) -> BoolArray:
+        """(n,) bool, an echo over several surfaces that shows its object more than a cell away from it."""
+        return np.zeros(len(self), dtype=bool) if self.chains is None else self.chains.ghost
+
+    def power_by_chain(self) -> dict[str, float]:
+        """Return received power of every chain [W]; the sum of :meth:`power_by_object` for each."""
+        names, row = np.unique(self.chain, return_inverse=True)
+        return {str(name): float(p) for name, p in zip(names, self._power_of(row, len(names)), strict=True)}
+
     def power_by_object(self) -> dict[int, float]:
         """Return received power of every object [W].
 
@@ -112,17 +136,21 @@ class Returns:
         array's phase reference, mid-frame.
         """
         ids, row = np.unique(self.object_id, return_inverse=True)
+        return {int(i): float(p) for i, p in zip(ids, self._power_of(row, len(ids)), strict=True)}
+
+    def _power_of(self, row: IntArray, count: int) -> FloatArray:
         phasor = self.amplitude * np.exp(2j * np.pi * self.center_hz * self.delay_s)
         phasor = np.where(self.coherent, phasor, 0.0)
-        re = np.bincount(row, phasor.real, len(ids))
-        im = np.bincount(row, phasor.imag, len(ids))
-        speckle = np.bincount(row, np.where(self.coherent, 0.0, np.abs(self.amplitude) ** 2), len(ids))
-        total = re**2 + im**2 + speckle
-        return {int(i): float(p) for i, p in zip(ids, total, strict=True)}
+        re = np.bincount(row, phasor.real, count)
+        im = np.bincount(row, phasor.imag, count)
+        speckle = np.bincount(row, np.where(self.coherent, 0.0, np.abs(self.amplitude) ** 2), count)
+        return np.asarray(re**2 + im**2 + speckle)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save every field, and ``delay_s``, to an ``.npz`` file."""
-        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "chains"}
+        if self.chains is not None:
+            arrays |= {f"chains_{f.name}": getattr(self.chains, f.name) for f in fields(self.chains)}
         arrays["weather"] = None if self.weather is None else self.weather.to_array()
         save_npz(path, arrays | {"delay_s": self.delay_s})
 
@@ -134,13 +162,15 @@ class Returns:
         ------
         NotFoundError, InputError
         """
-        names = [f.name for f in fields(cls) if f.name not in ("weather", *_OPTIONAL)]
+        names = [f.name for f in fields(cls) if f.name not in ("weather", "chains", *_OPTIONAL)]
         arrays: dict[str, Any] = load_npz(path, names)
         values = {name: arrays[name] for name in names}
         values |= {"center_hz": float(values["center_hz"]), "model": str(values["model"])}
         if "weather" in arrays:
             values["weather"] = Weather.from_array(arrays["weather"])
         values |= {name: arrays[name] for name in _OPTIONAL if name in arrays}
+        if "chains_row" in arrays:
+            values["chains"] = Chains(**{f.name: arrays[f"chains_{f.name}"] for f in fields(Chains)})
         return cls(**values)
 
 

@@ -18,7 +18,7 @@ LAYERS = (
     ("errors", "constants", "_typing"),
     ("frames", "randomness", "resources", "_parallel", "io.npz", "config._base", "config.loader"),
     ("physics", "tags"),
-    ("paths", "scatterers", "scene.mesh", "scene.mesh_frames"),  # plain values that the scene's models hold
+    ("paths", "chains", "scatterers", "scene.mesh", "scene.mesh_frames"),  # plain values that the scene's models hold
     ("config",),
     ("scene", "lidar"),
     ("tracing.backend", "tracing.caster"),

@@ -11,12 +11,14 @@ import numpy as np
 
 from .._parallel import map_blocks
 from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from ..chains import Chains
 from ..constants import FOUR_PI_CUBED, SPEED_OF_LIGHT
 from ..paths import Paths
 from ..physics.roughness import coherent_factor
 from ..returns import Returns
 from ..sbr.fields import radiated, reflected_field
 from ..scatterers import Scatterers, Weather
+from .ghosts import apparent_cosines, appear_elsewhere
 from .link import link_amplitude
 
 if TYPE_CHECKING:
@@ -52,6 +54,8 @@ def with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile, 
     place, velocity = _apparent(paths, reverse, arrival)
     outward, outward_velocity = _outward(paths, reverse, departure)
     object_id, tag = paths.owner
+    shown = apparent_cosines(arrival, departure, profile)
+    ghost = appear_elsewhere(scatterers, paths, 0.5 * paths.way, shown, profile)
     return replace(
         returns,
         amplitude=np.concatenate([returns.amplitude, amplitude]),
@@ -64,6 +68,7 @@ def with_paths(returns: Returns, scatterers: Scatterers, profile: RadarProfile, 
         scatterer=np.concatenate([returns.scatterer, -1 - row]),
         departure=np.concatenate([returns.position, outward]),
         departure_velocity=np.concatenate([returns.velocity, outward_velocity]),
+        chains=Chains.of(returns.object_id, paths, reverse[:, 0], ghost),
     )
 
 
