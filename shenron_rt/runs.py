@@ -5,7 +5,7 @@
     config.yaml     the resolved scene, profiles included; can be run again
     summary.json    strongest return and every object, frame by frame
     manifest.json   size and SHA-256 of every other file
-    radars/<name>/frame_000000/{scatterers,returns,adc,cube}.npz, detections.csv, *.png
+    radars/<name>/frame_000000/{scatterers,returns,adc,cube}.npz, detections.csv, detections.chains.csv, *.png
 """
 
 from __future__ import annotations
@@ -174,7 +174,9 @@ def write_frame(folder: Path, frame: FrameLike) -> None:
         stage = getattr(frame, name, None)
         if stage is not None:
             stage.save(folder / f"{name}.npz")
-    frame.detections.to_csv(folder / "detections.csv")
+    table = frame.detections.to_csv(folder / "detections.csv")
+    if any(">" in chain for chain in frame.detections.chain):  # else each is its object, as who reads the table knows
+        frame.detections.save_chains(table)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -210,13 +212,15 @@ def strongest_summary(detections: Detections) -> dict[str, Any] | None:
         "velocity_mps": float(row["velocity"]),
         "snr_db": float(row["snr_db"]),
         "object_id": int(row["object_id"]),
+        "chain": str(detections.chain[0]),
+        "ghost": bool(detections.ghost[0]),
     }
 
 
 def objects_summary(
     returns: Returns, cube: RadarCube, detections: Detections, names: Mapping[int, str] | None = None
 ) -> list[dict[str, Any]]:
-    """Return one record an object: id, tag, power_dbw, snr_db, detected, name; by falling power.
+    """Return one record an object: id, tag, power_dbw, snr_db, detected, ghosts, name; by falling power.
 
     Parameters
     ----------
@@ -234,7 +238,7 @@ def objects_summary(
 
     power = returns.power_by_object()
     noise = cube.noise_power_w / cube.profile.n_virtual
-    seen = {int(i) for i in np.unique(detections.object_id)}
+    seen = {int(i) for i in np.unique(detections.object_id[~detections.ghost])}
     ids, first = np.unique(returns.object_id, return_index=True)
     tags = dict(zip((int(i) for i in ids), (int(t) for t in returns.tag[first]), strict=True))
     records = []
@@ -251,6 +255,7 @@ def objects_summary(
                 "power_dbw": level,
                 "snr_db": None if level is None else level - 10 * math.log10(noise),
                 "detected": number in seen,
+                "ghosts": int(np.sum(detections.ghost & (detections.object_id == number))),
             }
         )
     return records

@@ -34,13 +34,19 @@ def _strongest(radar: str, frame: Mapping[str, Any]) -> list[Any]:
     names = {o["id"]: o["name"] for o in frame["objects"]}
     who = "unknown" if best["object_id"] < 0 else names.get(best["object_id"], f"object {best['object_id']}")
     values = [f"{best[k]:.2f}" for k in ("range_m", "azimuth_deg", "velocity_mps")]
+    chain = best.get("chain", "")
+    if ">" in chain:
+        who += f" ({'ghost, ' if best['ghost'] else ''}{chain})"
     return [radar, frame["frame"], *values, f"{best['snr_db']:.1f}", who]
 
 
 def _object(item: Mapping[str, Any]) -> list[Any]:
     level = None if item["power_dbw"] is None else f"{item['power_dbw'] + 30:.1f}"
     snr = None if item["snr_db"] is None else f"{item['snr_db']:.1f}"
-    return [item["id"], item["name"], item["tag"], level, snr, "yes" if item["detected"] else "no"]
+    seen = "yes" if item["detected"] else "no"
+    if item["ghosts"]:
+        seen += f", {item['ghosts']} ghost{'s' if item['ghosts'] > 1 else ''}"
+    return [item["id"], item["name"], item["tag"], level, snr, seen]
 
 
 def _hidden(count: int, what: str) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
 from ..constants import RCS_FLOOR_DBSM, SPEED_OF_LIGHT
 from ..errors import InputError
 from ..physics.link_budget import rcs_from_power
@@ -120,9 +120,10 @@ def detect(
     hits &= (cube.range_m >= blanking_m)[:, None]
     row, column = np.nonzero(hits & local_maxima(power))
     peaks = _estimate(cube, row, column, threshold)
-    table = _table(cube, peaks)
-    table = table[table["range"] > 0]
-    return Detections(table[np.argsort(-table["power"], kind="stable")], int(hits.sum()))
+    table, chain, ghost = _table(cube, peaks)
+    order = np.argsort(-table["power"], kind="stable")
+    order = order[table["range"][order] > 0]
+    return Detections(table[order], int(hits.sum()), chain[order], ghost[order])
 
 
 @dataclass(frozen=True)
@@ -250,8 +251,8 @@ def _distinct(cube: RadarCube, first: PeakFit, second: PeakFit) -> IntArray:
     return np.flatnonzero(apart & (weak > _SECOND_PART * strong) & (weak < 2 * strong))
 
 
-def _table(cube: RadarCube, peaks: _Peaks) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    """Turn fitted peaks into rows."""
+def _table(cube: RadarCube, peaks: _Peaks) -> tuple[np.ndarray[tuple[int], np.dtype[np.void]], NDArray[Any], BoolArray]:
+    """Turn fitted peaks into rows, with their chains and whether they are ghosts."""
     p = cube.profile
     fit = peaks.fit
     column = peaks.column - cube.n_fft[1] // 2 + fit.doppler_bin
@@ -278,9 +279,9 @@ def _table(cube: RadarCube, peaks: _Peaks) -> np.ndarray[tuple[int], np.dtype[np
         truth = attribute(cube, cube.returns, peaks.row, peaks.column, fit.sine, fit.sine_elevation)
         table["object_id"], table["tag"] = truth.object_id, truth.tag
         table["ambiguous"] = _folded(cube, truth)
-    else:
-        table["object_id"] = -1
-    return table
+        return table, truth.chain, truth.ghost
+    table["object_id"] = -1
+    return table, np.full(len(table), ""), np.zeros(len(table), dtype=bool)
 
 
 def _folded(cube: RadarCube, truth: Attribution) -> BoolArray:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
@@ -41,6 +42,14 @@ DETECTION_DTYPE = np.dtype(
 )
 
 
+#: Columns of the file beside the table.
+_CHAIN_COLUMNS = ["chain", "ghost"]
+
+
+def _not_given() -> NDArray[Any]:
+    return np.array(0)
+
+
 @dataclass(frozen=True)
 class Detections:
     """Grouped peaks of one frame, strongest first, in the radar frame at mid-frame.
@@ -51,14 +60,29 @@ class Detections:
         ``object_id`` -1 is noise or a side lobe; ``elevation`` is NaN where ``elevation_valid`` is false.
     n_cfar_hits : int
         Cells of the range-Doppler map above the threshold, before grouping.
+    chain : (n,) str
+        The objects that the wave met, from transmitter to receiver: ``"40>101"`` is radar, 40, 101, radar; ``""`` where
+        ``object_id`` is -1. Default: the object alone.
+    ghost : (n,) bool
+        True where the echo met several surfaces and shows its object at a place that is not on it. Default: nowhere.
     """
 
     table: NDArray[Any]
     n_cfar_hits: int = 0
+    chain: NDArray[Any] = field(default_factory=_not_given)
+    ghost: BoolArray = field(default_factory=_not_given)
 
     def __post_init__(self) -> None:
         if self.table.dtype != DETECTION_DTYPE or self.table.ndim != 1:
             raise InputError(f"Detections.table: a line of {DETECTION_DTYPE.names} is needed, got {self.table.dtype}")
+        ids = self.table["object_id"]
+        if self.chain.ndim == 0:
+            object.__setattr__(self, "chain", np.where(ids >= 0, ids.astype(np.str_), ""))
+        if self.ghost.ndim == 0:
+            object.__setattr__(self, "ghost", np.zeros(len(ids), dtype=bool))
+        for name in ("chain", "ghost"):
+            if getattr(self, name).shape != ids.shape:
+                raise InputError(f"Detections.{name}: {len(ids)} rows are needed, got {getattr(self, name).shape}")
 
     def __len__(self) -> int:
         return len(self.table)
@@ -148,45 +172,68 @@ class Detections:
     # ---- files
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the table with its column names as header; numbers in full precision, flags as 0 and 1."""
-        text = io.StringIO(newline="")
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(DETECTION_DTYPE.names or ())
-        for row in self.table.tolist():
-            writer.writerow([int(v) if isinstance(v, bool) else repr(v) for v in row])
-
-        def write(file: IO[bytes]) -> None:
-            file.write(text.getvalue().encode())
-
-        return atomic_write(path, write)
+        rows = ([int(v) if isinstance(v, bool) else repr(v) for v in row] for row in self.table.tolist())
+        return _write(path, [list(DETECTION_DTYPE.names or ()), *rows])
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the table; the same as :meth:`to_csv`."""
         return self.to_csv(path)
 
+    def save_chains(self, path: str | os.PathLike[str]) -> Path:
+        """Write ``chain`` and ``ghost``, row by row, beside a table written to ``path``: ``detections.chains.csv``."""
+        flags = zip(self.chain.tolist(), self.ghost.tolist(), strict=True)
+        return _write(_beside(path), [_CHAIN_COLUMNS, *([name, int(ghost)] for name, ghost in flags)])
+
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what :meth:`to_csv` wrote; ``n_cfar_hits`` is not in the file and reads 0.
+        """Read what :meth:`to_csv` wrote, with the chains where :meth:`save_chains` did; ``n_cfar_hits`` reads 0.
 
         Raises
         ------
         NotFoundError, InputError
         """
         file = Path(path)
-        try:
-            rows = list(csv.reader(file.read_text().splitlines()))
-        except FileNotFoundError:
-            raise NotFoundError(f"{file}: no such file") from None
         names = list(DETECTION_DTYPE.names or ())
-        if not rows or rows[0] != names:
-            raise InputError(
-                f"{file}:1: the header must be {','.join(names)}, got {','.join(rows[0]) if rows else ''!r}"
-            )
-        table = np.zeros(len(rows) - 1, dtype=DETECTION_DTYPE)
-        for i, row in enumerate(rows[1:]):
+        rows = _read(file, names)
+        table = np.zeros(len(rows), dtype=DETECTION_DTYPE)
+        for i, row in enumerate(rows):
             try:
                 table[i] = tuple(
                     float(v) if DETECTION_DTYPE[k].kind == "f" else int(v) for k, v in zip(names, row, strict=True)
                 )
             except ValueError as error:
                 raise InputError(f"{file}:{i + 2}: {len(names)} numbers are needed, got {row} ({error})") from None
-        return cls(table)
+        side = _beside(file)
+        if not side.is_file():
+            return cls(table)
+        labels = _read(side, _CHAIN_COLUMNS)
+        if len(labels) != len(table) or any(len(r) != 2 or r[1] not in ("0", "1") for r in labels):
+            raise InputError(f"{side}: {len(table)} rows of a chain and 0 or 1 are needed, as many as in {file.name}")
+        chain = np.array([r[0] for r in labels] or [""][:0], dtype=np.str_)
+        return cls(table, chain=chain, ghost=np.array([r[1] == "1" for r in labels], dtype=bool))
+
+
+def _beside(path: str | os.PathLike[str]) -> Path:
+    file = Path(path)
+    return file.with_name(f"{file.stem}.chains.csv")
+
+
+def _write(path: str | os.PathLike[str], rows: Sequence[Sequence[Any]]) -> Path:
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+
+    def write(file: IO[bytes]) -> None:
+        file.write(text.getvalue().encode())
+
+    return atomic_write(path, write)
+
+
+def _read(file: Path, names: list[str]) -> list[list[str]]:
+    """Return the rows below a header that must be ``names``."""
+    try:
+        rows = list(csv.reader(file.read_text().splitlines()))
+    except FileNotFoundError:
+        raise NotFoundError(f"{file}: no such file") from None
+    if not rows or rows[0] != names:
+        raise InputError(f"{file}:1: the header must be {','.join(names)}, got {','.join(rows[0]) if rows else ''!r}")
+    return rows[1:]

@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from .._typing import ArrayLike, FloatArray
+from .._typing import ArrayLike, BoolArray, FloatArray
 from ..io.npz import atomic_write
 
 if TYPE_CHECKING:
@@ -23,10 +23,12 @@ __all__ = [
     "THRESHOLD",
     "TRACE",
     "TRUTH",
+    "counted",
     "dbm",
     "label",
     "limits",
     "new_figure",
+    "ring",
     "save",
 ]
 
@@ -64,6 +66,19 @@ def limits(level_db: FloatArray, noise_dbm: float) -> tuple[float, float]:
     finite = level_db[np.isfinite(level_db)]
     top = float(np.ceil(finite.max())) if finite.size else noise_dbm
     return max(top - SPAN_DB, min(float(np.floor(noise_dbm)) - 3, top - 10)), top
+
+
+def ring(axes: Axes, x: FloatArray, y: FloatArray, ghost: BoolArray, size: float = 9) -> None:
+    """Ring detections, and put squares round ghosts, so that both can be told without colour."""
+    for rows, marker in ((~ghost, "o"), (ghost, "s")):
+        axes.plot(x[rows], y[rows], ls="none", marker=marker, ms=size, mfc="none", mec=DETECTION, mew=1.2)
+
+
+def counted(ghost: BoolArray) -> str:
+    """Return the legend of :func:`ring`: ``o 5 detections``, with ghosts ``o 5 detections   \u25a1 2 ghosts``."""
+    text = f"o {int(np.sum(~ghost))} detections"
+    count = int(np.sum(ghost))
+    return f"{text}   \u25a1 {count} ghost{'s' if count > 1 else ''}" if count else text
 
 
 def label(axes: Axes, taken: list[tuple[float, float]], x: float, y: float, text: str, *, left: bool = False) -> None:

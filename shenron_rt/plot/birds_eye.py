@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._typing import FloatArray
-from ._style import CMAP, DETECTION, dbm, label, limits, new_figure
+from ._style import CMAP, dbm, label, limits, new_figure, ring
 from .truth import Truth
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def birds_eye(
     cube : RadarCube
         Its ``range_azimuth`` is resampled, bilinear in dB, onto square pixels.
     detections : Detections, optional
-        Ringed at range and azimuth.
+        Ringed at range and azimuth, ghosts in squares.
     truth : sequence of Truth
     title : str
 
@@ -57,7 +57,7 @@ def birds_eye(
     _rings(axes, reach)
     if detections is not None and len(detections):
         y, x = detections.range * np.sin(detections.azimuth), detections.range * np.cos(detections.azimuth)
-        axes.plot(y, x, ls="none", marker="o", ms=9, mfc="none", mec=DETECTION, mew=1.2)
+        ring(axes, y, x, detections.ghost)
     axes.set_xlim(side * 1.02, -side * 1.02)
     axes.set_ylim(0, reach * 1.02)
     axes.set_aspect("equal")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ._style import CMAP, DETECTION, dbm, label, limits, new_figure
+from ._style import CMAP, counted, dbm, label, limits, new_figure, ring
 from .truth import Truth
 
 if TYPE_CHECKING:
@@ -21,12 +21,13 @@ _MAX_LABELS = 6
 def range_doppler(
     cube: RadarCube, detections: Detections | None = None, *, truth: Sequence[Truth] = (), title: str = ""
 ) -> Figure:
-    """Draw power over range rate and range, detections ringed, objects as crosses at their folded velocity.
+    """Draw power over range rate and range, objects as crosses at their folded velocity.
 
     Parameters
     ----------
     cube : RadarCube
     detections : Detections, optional
+        Ringed, ghosts in squares.
     truth : sequence of Truth
     title : str
 
@@ -45,9 +46,7 @@ def range_doppler(
         extent=(v[0] - dv / 2, v[-1] + dv / 2, -dr / 2, r[-1] + dr / 2),
     )  # fmt: skip
     if detections is not None and len(detections):
-        axes.plot(
-            detections.velocity, detections.range, ls="none", marker="o", ms=10, mfc="none", mec=DETECTION, mew=1.2
-        )
+        ring(axes, detections.velocity, detections.range, detections.ghost, size=10)
     axes.set_xlim(v[0] - dv / 2, v[-1] + dv / 2)
     axes.set_ylim(0, r[-1] + dr / 2)
     taken: list[tuple[float, float]] = []
@@ -61,7 +60,7 @@ def range_doppler(
     bar = figure.colorbar(image, cax=figure.add_axes((0.86, 0.10, 0.025, 0.80)))
     bar.set_label(f"power, mean of channels [dBm], {high - low:.0f} dB shown", fontsize=9)
     bar.ax.tick_params(labelsize=8)
-    count = 0 if detections is None else len(detections)
+    marked = "o 0 detections" if detections is None else counted(detections.ghost)
     figure.text(0.10, 0.955, title or "Range-Doppler", fontsize=11, weight="bold", va="center")
-    figure.text(0.84, 0.925, f"o {count} detections   + truth", fontsize=8, ha="right", va="center", color="#555b66")
+    figure.text(0.84, 0.925, f"{marked}   + truth", fontsize=8, ha="right", va="center", color="#555b66")
     return figure

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._typing import ArrayLike, FloatArray, IntArray
-from ._style import DETECTION, dbm, new_figure
+from ._style import counted, dbm, new_figure, ring
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
@@ -68,7 +68,7 @@ def top_view(
     mappable = _paint(picture, scatterers, returns, grid)
     axes.imshow(picture, origin="lower", extent=(half, -half, x0, x1), interpolation="nearest")
     if detections is not None and len(detections):
-        axes.plot(detections.y, detections.x, ls="none", marker="o", ms=9, mfc="none", mec=DETECTION, mew=1.2)
+        ring(axes, detections.y, detections.x, detections.ghost)
     axes.plot(0, 0, marker="^", ms=8, color="white", mec="black", clip_on=False)
     axes.set_xlim(half, -half)
     axes.set_ylim(x0, x1)
@@ -81,7 +81,8 @@ def top_view(
         bar.ax.tick_params(labelsize=8)
     figure.text(0.08, 0.955, title or "Scatterers, top view", fontsize=11, weight="bold", va="center")
     grey = "" if mesh is None else "mesh edges grey, "
-    legend = f"{len(scatterers):,} scatterers, {grey}o detections"
+    marked = "o detections" if detections is None or not detections.ghost.any() else counted(detections.ghost)
+    legend = f"{len(scatterers):,} scatterers, {grey}{marked}"
     figure.text(0.86, 0.918, legend, fontsize=8, ha="right", color="#555b66")
     return figure
 

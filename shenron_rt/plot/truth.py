@@ -15,7 +15,10 @@ __all__ = ["Truth", "truth_of"]
 
 @dataclass(frozen=True)
 class Truth:
-    """One object as the radar sees it at mid-frame: power-weighted means over its echoes. SI, azimuth + left."""
+    """One object as the radar sees it at mid-frame: power-weighted means over its echoes. SI, azimuth + left.
+
+    Ghosts, which show it where it is not, do not count.
+    """
 
     object_id: int
     name: str
@@ -35,7 +38,7 @@ def truth_of(returns: Returns | None, names: Mapping[int, str] | None = None) ->
     """Return every object with an id of its own, strongest first; the static rest (id 0) has no one place."""
     if returns is None or len(returns) == 0:
         return []
-    power = np.abs(returns.amplitude) ** 2
+    power = np.where(returns.ghost, 0.0, np.abs(returns.amplitude) ** 2)
     distance, _, _ = spherical(returns.position)
     rate = np.einsum("ij,ij->i", returns.position, returns.velocity) / np.maximum(distance, 1e-9)
     ids, row = np.unique(returns.object_id, return_inverse=True)
