@@ -201,26 +201,29 @@ def plain(value: Any) -> Any:
     return value
 
 
-def strongest_summary(detections: Detections) -> dict[str, Any] | None:
-    """Return the strongest detection with the keys of ``summary.json``; None where nothing was detected."""
+def strongest_summary(detections: Detections, *, chains: bool = False) -> dict[str, Any] | None:
+    """Return the strongest detection with the keys of ``summary.json``; None where nothing was detected.
+
+    ``chains`` adds the objects that its wave met, and whether it is a ghost.
+    """
     if len(detections) == 0:
         return None
     row = detections.table[0]
+    several = {"chain": str(detections.chain[0]), "ghost": bool(detections.ghost[0])} if chains else {}
     return {
         "range_m": float(row["range"]),
         "azimuth_deg": math.degrees(float(row["azimuth"])),
         "velocity_mps": float(row["velocity"]),
         "snr_db": float(row["snr_db"]),
         "object_id": int(row["object_id"]),
-        "chain": str(detections.chain[0]),
-        "ghost": bool(detections.ghost[0]),
+        **several,
     }
 
 
 def objects_summary(
     returns: Returns, cube: RadarCube, detections: Detections, names: Mapping[int, str] | None = None
 ) -> list[dict[str, Any]]:
-    """Return one record an object: id, tag, power_dbw, snr_db, detected, ghosts, name; by falling power.
+    """Return one record an object: id, tag, power_dbw, snr_db, detected, name; by falling power.
 
     Parameters
     ----------
@@ -241,7 +244,7 @@ def objects_summary(
     seen = {int(i) for i in np.unique(detections.object_id[~detections.ghost])}
     ids, first = np.unique(returns.object_id, return_index=True)
     tags = dict(zip((int(i) for i in ids), (int(t) for t in returns.tag[first]), strict=True))
-    records = []
+    records: list[dict[str, Any]] = []
     for number in sorted(set(power) | set(names or {}), key=lambda i: -power.get(i, -1.0)):
         watts = power.get(number, 0.0)
         if watts == 0 and number == 0:
@@ -255,9 +258,10 @@ def objects_summary(
                 "power_dbw": level,
                 "snr_db": None if level is None else level - 10 * math.log10(noise),
                 "detected": number in seen,
-                "ghosts": int(np.sum(detections.ghost & (detections.object_id == number))),
             }
         )
+        if returns.chains is not None:
+            records[-1]["ghosts"] = int(np.sum(detections.ghost & (detections.object_id == number)))
     return records
 
 
@@ -268,7 +272,7 @@ def frame_summary(frame: FrameLike, names: Mapping[int, str] | None = None) -> d
         "frame": frame.frame,
         "time_s": frame.time,
         "detections": len(frame.detections),
-        "strongest": strongest_summary(frame.detections),
+        "strongest": strongest_summary(frame.detections, chains=getattr(returns, "chains", None) is not None),
         "objects": [] if returns is None else objects_summary(returns, frame.cube, frame.detections, names),
     }
 

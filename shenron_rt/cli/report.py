@@ -44,8 +44,8 @@ def _object(item: Mapping[str, Any]) -> list[Any]:
     level = None if item["power_dbw"] is None else f"{item['power_dbw'] + 30:.1f}"
     snr = None if item["snr_db"] is None else f"{item['snr_db']:.1f}"
     seen = "yes" if item["detected"] else "no"
-    if item["ghosts"]:
-        seen += f", {item['ghosts']} ghost{'s' if item['ghosts'] > 1 else ''}"
+    if ghosts := item.get("ghosts", 0):
+        seen += f", {ghosts} ghost{'s' if ghosts > 1 else ''}"
     return [item["id"], item["name"], item["tag"], level, snr, seen]
 
 
