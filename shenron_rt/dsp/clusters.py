@@ -40,7 +40,7 @@ class Clusters:
     part : (n, 2) int
         Position in parts of a bin.
     cosines, sent : (n, 2) float
-        Directions along y and z in which receivers and transmitters see it.
+        Directions along y and z in which receivers and transmitters see it; ``sent``: ``None`` if all are the same.
     object_id, tag, chain : (n,) int
         ``chain`` is twice the row into ``Returns.chains``, plus one for ghosts; 0 where there are no chains.
     phasor : (n,) complex
@@ -53,7 +53,7 @@ class Clusters:
 
     part: IntArray
     cosines: FloatArray
-    sent: FloatArray
+    sent: FloatArray | None
     object_id: IntArray
     tag: IntArray
     chain: IntArray
@@ -91,12 +91,14 @@ class Clusters:
         if returns.chains is not None:
             chain = 2 * returns.chains.row.take(rows).astype(np.int64) + returns.chains.ghost.take(rows)
         label, labels = _compact([ids, tags, chain], [int(ids.max(initial=0)) + 1, 256, int(chain.max(initial=0)) + 1])
-        arrival = returns.position[rows, 1:] / distance[rows, None]
-        sent = arrival if not legs or returns.departure is None else _unit(returns.departure[rows])[:, 1:]
         keys, sizes = [cell.take(rows), label], [cells, labels]
-        for cosines in (arrival, sent) if legs else (arrival,):
+        seen = [(returns.position, distance)]
+        if legs and returns.departure is not None:
+            seen.append((returns.departure, np.maximum(np.linalg.norm(returns.departure, axis=1), 1e-9)))
+        for place, away in seen:
             for axis, n in _beams(cube).items():
-                keys.append(np.minimum((cosines[:, axis] * (n / 2) + n / 2).astype(np.int32), n - 1))
+                cosine = place[:, axis].take(rows) / away.take(rows)
+                keys.append(np.minimum((cosine * (n / 2) + n / 2).astype(np.int32), n - 1))
                 sizes.append(n)
         cluster, count = _compact(keys, sizes)
         amplitude, coherent = returns.amplitude.take(rows), returns.coherent.take(rows)
@@ -106,8 +108,8 @@ class Clusters:
         at = rows[some]
         return cls(
             part=np.stack([i[at], j[at]], axis=1),
-            cosines=arrival[some],
-            sent=sent[some],
+            cosines=returns.position[at, 1:] / distance[at, None],
+            sent=None if returns.departure is None else seen[-1][0][at, 1:] / seen[-1][1][at, None],
             object_id=returns.object_id[at].astype(np.int64),
             tag=returns.tag[at],
             chain=chain[some],
@@ -119,11 +121,11 @@ class Clusters:
 
 
 def _beams(cube: RadarCube) -> dict[int, int]:
-    """Return the steps of direction cosines in which echoes are gathered, by axis: 0 along y, 1 along z."""
+    """Return the steps of direction cosines in which echoes are gathered, by axis: 1 along y, 2 along z."""
     p = cube.profile
-    beams = {0: max(64, len(cube.azimuth_sine))}
+    beams = {1: max(64, len(cube.azimuth_sine))}
     if angle.has_elevation(p.positions_m, p.wavelength_m):
-        beams[1] = _ELEVATION_STEPS
+        beams[2] = _ELEVATION_STEPS
     return beams
 
 

@@ -84,7 +84,11 @@ def attribute(
     cell = _response(cube.range_window, w.samples, cube.n_fft[0], off_r)
     cell = cell * _response(cube.doppler_window, w.chirps, cube.n_fft[1], off_d)
     beam = np.stack([sine, elevation], axis=1)[peak]
-    array = _array_response(cube, clusters.cosines[cluster] - beam, clusters.sent[cluster] - beam)
+    heard = clusters.cosines[cluster] - beam
+    if clusters.sent is None:
+        array: FloatArray | ComplexArray = _same_legs(cube, heard[:, 0], heard[:, 1])
+    else:
+        array = _array_response(cube, heard, clusters.sent[cluster] - beam)
     return _strongest(cube, clusters, returns, peak, cluster, cell * array, n)
 
 
@@ -120,17 +124,14 @@ def _response(name: str, n: int, n_fft: int, offset: FloatArray) -> FloatArray:
     return np.asarray(table[index], dtype=np.float64)
 
 
-def _array_response(cube: RadarCube, heard: FloatArray, sent: FloatArray) -> FloatArray | ComplexArray:
+def _array_response(cube: RadarCube, heard: FloatArray, sent: FloatArray) -> ComplexArray:
     """Return the array factor about its middle, by differences of cosines at receivers and transmitters, (n, 2) each.
 
     Of echoes that arrive from where they left to, its real part.
     """
     legs = np.flatnonzero(np.any(heard != sent, axis=1))
-    same = _same_legs(cube, heard[:, 0], heard[:, 1])
-    if not len(legs):
-        return same
     wavenumber = 2 * np.pi / cube.profile.wavelength_m
-    factor = same.astype(np.complex128)
+    factor = _same_legs(cube, heard[:, 0], heard[:, 1]).astype(np.complex128)
     factor[legs] = 1.0
     for elements, off in ((cube.profile.rx_m, heard[legs]), (cube.profile.tx_m, sent[legs])):
         centred = (elements - elements.mean(axis=0))[:, 1:]
