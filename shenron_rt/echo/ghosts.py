@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["apparent_cosines", "appear_elsewhere"]
 
+#: Places are told apart to this part of a cell.
+_PARTS = 8
 #: An array with less aperture than this part of a wavelength tells no directions.
 _SAME_POSITION = 1e-3
 
@@ -63,7 +65,8 @@ def appear_elsewhere(
 
     Notes
     -----
-    Objects of id 0 are told apart by their tag: a wall is not where a road is.
+    Places are rounded to an eighth of a cell. Objects of id 0 are told apart by their tag: a wall is not where a road
+    is.
     """
     from scipy.spatial import KDTree
 
@@ -80,11 +83,22 @@ def appear_elsewhere(
     seen = np.column_stack([distance, at[known][:, 1:] / np.maximum(distance, 1e-9)[:, None]]) / cell * told
     shown = np.column_stack([place_m, cosines]) / cell * told
     # objects stand four cells apart on an axis of their own, so that one tree holds them all
-    tree = KDTree(np.column_stack([seen, 4.0 * np.searchsorted(number, of[known])]))
-    away, _ = tree.query(
-        np.column_stack([shown, 4.0 * np.searchsorted(number, own)]), p=np.inf, distance_upper_bound=1.0
-    )
-    return np.asarray(~np.isfinite(away))
+    places, _ = _distinct(seen, 4 * np.searchsorted(number, of[known]))
+    asked, row = _distinct(shown, 4 * np.searchsorted(number, own))
+    away, _ = KDTree(places).query(asked, p=np.inf, distance_upper_bound=1.0)
+    return np.asarray(~np.isfinite(away))[row]
+
+
+def _distinct(place: FloatArray, number: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return the distinct places and numbers (m, 4), to a part of a cell, and the row of each of n in them."""
+    part = np.rint(place * _PARTS).astype(np.int64)
+    low = part.min(axis=0)
+    span = np.ptp(part, axis=0) + 1
+    packed = np.asarray(number, dtype=np.int64)
+    for column in range(3):
+        packed = packed * span[column] + (part[:, column] - low[column])
+    _, first, row = np.unique(packed, return_index=True, return_inverse=True)
+    return np.column_stack([part[first] / _PARTS, number[first]]), row.ravel()
 
 
 def _key(object_id: IntArray, tag: IntArray) -> IntArray:
