@@ -268,3 +268,17 @@ def test_an_object_is_not_drawn_between_itself_and_its_ghosts() -> None:
     shown = next(t for t in truth_of(frame.returns) if t.object_id == 7)
     assert shown.y == pytest.approx(0.0, abs=0.3)
     assert shown.range_m == pytest.approx(13.7, abs=0.3)
+
+
+def test_pictures_put_squares_round_ghosts() -> None:
+    from shenron_rt.plot import birds_eye, range_doppler
+
+    frame = ball_before_the_rail()
+    ghosts = int(frame.detections.ghost.sum())
+    for draw in (range_doppler, birds_eye):
+        figure = draw(frame.cube, frame.detections)
+        marks = {line.get_marker(): len(line.get_xdata()) for line in figure.axes[0].lines if line.get_marker() in "os"}
+        assert marks == {"o": len(frame.detections) - ghosts, "s": ghosts}
+    texts = [t.get_text() for t in range_doppler(frame.cube, frame.detections).texts]
+    assert any("\u25a1 3 ghosts" in t for t in texts)
+    assert not any("ghost" in t.get_text() for t in range_doppler(frame.cube).texts)
