@@ -166,8 +166,10 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
     """Write every frame of every radar and return the summary."""
     from .. import runs
     from ..pipeline import simulate
+    from ..scene.motion_of import check_times
 
     wanted = frame_range(options.frames)
+    check_times(scene, (k * scene.frame_period_s + dt for k in (wanted[0], wanted[-1]) for dt in _mid_frames(scene)))
     names = scene.object_names()
     radars, backends = [], []
     with progress(len(wanted) * len(scene.radars), "rendering", quiet=quiet) as step:
@@ -209,6 +211,11 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
     }
 
 
+def _mid_frames(scene: Scene) -> list[float]:
+    """Return when each radar's frame has its middle, after its start [s]."""
+    return [scene.profile_of(r).frame_mid_s for r in scene.radars]
+
+
 def _version() -> str:
     from . import _version as version
 
@@ -241,8 +248,8 @@ def _write_config(path: Path, scene: Scene) -> None:
         for r in scene.radars
     ]
     located = _locator(scene.folder)
-    for part in (*data.get("static", ()), *data.get("actors", ())):
-        for key in ("mesh", "resolve", "carla_tags"):
+    for part in (data.get("ego", {}), *data.get("static", ()), *data.get("actors", ())):
+        for key in ("mesh", "resolve", "carla_tags", "trajectory_file"):
             if key in part:
                 part[key] = located(part[key])
     data["materials"] = located(str(scene.materials))
@@ -253,6 +260,6 @@ def _write_config(path: Path, scene: Scene) -> None:
 def _locator(folder: Path) -> Callable[[str], str]:
     def located(text: str) -> str:
         file = folder / text
-        return str(file.resolve()) if file.is_file() else text
+        return str(file.resolve()) if file.is_file() or any(file.glob("*.meta.yaml")) else text
 
     return located

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -19,7 +20,10 @@ from ._base import ConfigModel, Placed, Vector3
 from .loader import apply_overrides, read_yaml, validate_model
 from .profile import RadarProfile, load_profile
 
-__all__ = ["Actor", "Ego", "LidarMount", "MeshSource", "PointTarget", "RadarMount", "Scene", "StaticPart", "load_scene"]
+__all__ = [
+    "Actor", "Ego", "Keyframe", "LidarMount", "MeshSource", "Moving", "PointTarget", "RadarMount", "Scene", "StaticPart",
+    "load_scene",
+]  # fmt: skip
 
 ZERO = (0.0, 0.0, 0.0)
 ObjectId = Annotated[int, Field(ge=0, lt=2**32)]
@@ -33,6 +37,60 @@ def _known_tag(value: str | None) -> str | None:
     if value.lower() not in names:
         raise ValueError(f"unknown tag {value!r}; {did_you_mean(value, [t.name for t in SemanticTag])}")
     return names[value.lower()]
+
+
+class Keyframe(Placed):
+    """A pose at one instant, in the frame of the ``xyz_m`` and ``ypr_deg`` of what moves: by default the world."""
+
+    t_s: float
+
+
+class Moving(Placed):
+    """What moves: steadily from a pose at time 0, or along a trajectory.
+
+    ``velocity_mps`` is in world axes and turns with the body when ``yaw_rate_deg_s`` is given. Beside a trajectory
+    ``xyz_m`` and ``ypr_deg`` are the frame of its poses, and a ``velocity_mps`` other than zero is the one at its
+    first keyframe.
+    """
+
+    velocity_mps: Vector3 = ZERO
+    yaw_rate_deg_s: float = 0.0
+    trajectory: tuple[Keyframe, ...] | None = None
+    trajectory_file: str | Path | None = None
+    trajectory_id: int | None = None
+    trajectory_frame: Literal["ros", "carla"] | None = None
+    trajectory_outside: Literal["error", "hold"] = "error"
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        if self.trajectory is not None and self.trajectory_file is not None:
+            raise ValueError("give trajectory (keyframes) or trajectory_file (a recording), not both")
+        if not self.has_trajectory:
+            return self
+        if self.yaw_rate_deg_s != 0:
+            raise ValueError("yaw_rate_deg_s and a trajectory contradict each other; the keyframes' ypr_deg turn it")
+        if self.trajectory_file is not None and self.trajectory_frame is None:
+            raise ValueError("trajectory_file needs trajectory_frame: carla (y right) or ros (y left)")
+        if self.trajectory is not None:
+            times = [k.t_s for k in self.trajectory]
+            if len(times) < 2:
+                raise ValueError(f"trajectory: at least two keyframes are needed, got {len(times)}")
+            for k, (before, after) in enumerate(itertools.pairwise(times), start=1):
+                if after <= before:
+                    raise ValueError(
+                        f"trajectory: keyframe {k} at {after:g} s does not follow {before:g} s; sort them by time"
+                    )
+        return self
+
+    @property
+    def has_trajectory(self) -> bool:
+        """Whether keyframes or a recording say where it is."""
+        return self.trajectory is not None or self.trajectory_file is not None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is ever anywhere else than at ``xyz_m`` and ``ypr_deg``."""
+        return self.has_trajectory or any(self.velocity_mps) or self.yaw_rate_deg_s != 0
 
 
 class MeshSource(Placed):
@@ -67,12 +125,10 @@ class StaticPart(MeshSource):
     id: ObjectId = 0
 
 
-class Actor(MeshSource):
-    """A rigid body that moves: velocity in world axes, turning with the body when ``yaw_rate_deg_s`` is given."""
+class Actor(Moving, MeshSource):
+    """A body that moves."""
 
     id: ActorId
-    velocity_mps: Vector3 = ZERO
-    yaw_rate_deg_s: float = 0.0
 
 
 class PointTarget(ConfigModel):
@@ -88,11 +144,8 @@ class PointTarget(ConfigModel):
     _tag = field_validator("tag")(_known_tag)
 
 
-class Ego(Placed):
+class Ego(Moving):
     """The vehicle that carries the sensors; its frame has the origin on the ground."""
-
-    velocity_mps: Vector3 = ZERO
-    yaw_rate_deg_s: float = 0.0
 
 
 class RadarMount(Placed):

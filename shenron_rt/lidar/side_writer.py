@@ -12,7 +12,7 @@ from .._typing import FloatArray
 from ..config.scene import Actor, LidarMount, Scene
 from ..errors import InputError
 from ..frames import Pose, to_carla, to_carla_pose
-from ..scene.motion import body_state
+from ..scene.motion_of import ego_state, state_of
 from ..scene.world import source_mesh
 from .side_file import ActorState, SideFile
 
@@ -33,7 +33,7 @@ def scene_side_file(scene: Scene, lidar: LidarMount, time: float = 0.0) -> SideF
     -------
     SideFile
     """
-    ego = body_state(scene.ego.pose, scene.ego.velocity_mps, scene.ego.yaw_rate_deg_s, time)
+    ego = ego_state(scene, time)
     ego_pose = Pose.from_matrix(ego.rotation, ego.origin)
     actors = (_actor(actor, scene.folder, ego_pose, time) for actor in scene.actors)
     return SideFile(
@@ -47,7 +47,7 @@ def scene_side_file(scene: Scene, lidar: LidarMount, time: float = 0.0) -> SideF
 
 
 def _actor(actor: Actor, folder: Path, ego: Pose, time: float) -> ActorState:
-    state = body_state(actor.pose, actor.velocity_mps, actor.yaw_rate_deg_s, time)
+    state = state_of(actor, folder, time)
     pose = ego.inverse().compose(Pose.from_matrix(state.rotation, state.origin))
     vertices = source_mesh(actor, folder).vertices
     low, high = vertices.min(axis=0), vertices.max(axis=0)

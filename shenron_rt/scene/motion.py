@@ -1,4 +1,4 @@
-"""Rigid motion of actors and of the ego vehicle."""
+"""Rigid motion of actors, of their parts and of the ego vehicle."""
 
 from __future__ import annotations
 
@@ -11,33 +11,48 @@ from ..frames import Pose, rotation_matrix
 
 __all__ = ["BodyState", "body_state"]
 
+_UP = np.array([0.0, 0.0, 1.0])
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class BodyState:
-    """A rigid body at one instant, in the world frame.
+    """A rigid body at one instant, in its parent's frame: the world unless said otherwise.
 
     Parameters
     ----------
     rotation : (3, 3) float
-        Body to world.
+        Body to parent.
     origin : (3,) float
         Of the body frame [m].
     velocity : (3,) float
         Of the origin [m/s].
-    yaw_rate : float
-        About the world's z axis, + left [rad/s].
+    spin : (3,) float
+        Angular velocity, axes of the parent [rad/s].
     """
 
     rotation: FloatArray
     origin: FloatArray
     velocity: FloatArray
-    yaw_rate: float
+    spin: FloatArray
+
+    @property
+    def yaw_rate(self) -> float:
+        """About the parent's z axis, + left [rad/s]."""
+        return float(self.spin[2])
 
     def mounted(self, mount: Pose) -> BodyState:
         """Return the state of something fixed to this body at the pose ``mount``."""
-        arm = self.rotation @ mount.translation
-        turning = self.yaw_rate * np.array([-arm[1], arm[0], 0.0])
-        return BodyState(self.rotation @ mount.rotation, self.origin + arm, self.velocity + turning, self.yaw_rate)
+        return self.carrying(BodyState(mount.rotation, mount.translation, np.zeros(3), np.zeros(3)))
+
+    def carrying(self, child: BodyState) -> BodyState:
+        """Return the state, in this body's parent, of a child that moves in this body's frame."""
+        arm = self.rotation @ child.origin
+        return BodyState(
+            self.rotation @ child.rotation,
+            self.origin + arm,
+            self.velocity + np.cross(self.spin, arm) + self.rotation @ child.velocity,
+            self.spin + self.rotation @ child.spin,
+        )
 
 
 def body_state(pose: Pose, velocity_mps: ArrayLike, yaw_rate_deg_s: float, time: float) -> BodyState:
@@ -68,4 +83,4 @@ def body_state(pose: Pose, velocity_mps: ArrayLike, yaw_rate_deg_s: float, time:
     left_of_v = np.array([-v[1], v[0], 0.0])
     shift = along * v + across * left_of_v
     shift[2] = time * v[2]
-    return BodyState(turned @ pose.rotation, pose.translation + shift, turned @ v, rate)
+    return BodyState(turned @ pose.rotation, pose.translation + shift, turned @ v, rate * _UP)

@@ -13,11 +13,12 @@ from .._typing import FloatArray, IntArray, NDArray
 from ..config._base import Placed
 from ..config.loader import resolve_path
 from ..config.materials import MaterialTable, load_materials
-from ..config.scene import Actor, MeshSource, Scene
+from ..config.scene import MeshSource, Scene
 from ..errors import InputError, did_you_mean
 from ..tags import SemanticTag, parse_tag
 from .mesh import TaggedMesh
-from .motion import BodyState, body_state
+from .motion import BodyState
+from .motion_of import ego_state, state_of
 
 __all__ = ["Body", "World", "build_world", "load_bodies", "source_mesh"]
 
@@ -240,12 +241,11 @@ def build_world(scene: Scene, radar: Placed, time: float, bodies: tuple[Body, ..
     Coordinates are taken relative to the radar in float64 before any cast to float32: one float32 ulp at 1 km is 60 um,
     a tenth of a radian of 77 GHz phase.
     """
-    ego = body_state(scene.ego.pose, scene.ego.velocity_mps, scene.ego.yaw_rate_deg_s, time)
-    eye = ego.mounted(radar.pose)
+    eye = ego_state(scene, time).mounted(radar.pose)
     to_radar = eye.rotation.T
     vertices, normals, drift, turn = [], [], [], []
     for body in bodies:
-        state = _state(body, time)
+        state = state_of(body.source, scene.folder, time)
         rotation = to_radar @ state.rotation
         origin = to_radar @ (state.origin - eye.origin)
         vertices.append(body.mesh.vertices @ rotation.T + origin)
@@ -284,21 +284,11 @@ def _stack(items: list[NDArray[Any]], empty: tuple[int, ...], dtype: type[np.gen
     return np.concatenate(items).astype(dtype, copy=False) if items else np.zeros(empty, dtype)
 
 
-def _state(body: Body, time: float) -> BodyState:
-    source = body.source
-    if isinstance(source, Actor):
-        return body_state(source.pose, source.velocity_mps, source.yaw_rate_deg_s, time)
-    return BodyState(source.pose.rotation, source.pose.translation, np.zeros(3), 0.0)
-
-
 def relative_motion(state: BodyState, eye: BodyState) -> tuple[FloatArray, FloatArray]:
     """Return drift [m/s] and turn [rad/s] so that a body's point p moves at drift + turn x p in the radar's frame.
 
     The frame turns with the radar, so that p(t) = p + V t follows the point as the radar sees it; turning of the radar
     does not change any range rate.
     """
-    axis = np.array([0.0, 0.0, 1.0])
-    arm = eye.origin - state.origin
-    drift = state.velocity + state.yaw_rate * np.cross(axis, arm) - eye.velocity
-    turn = (state.yaw_rate - eye.yaw_rate) * axis
-    return eye.rotation.T @ drift, eye.rotation.T @ turn
+    drift = state.velocity + np.cross(state.spin, eye.origin - state.origin) - eye.velocity
+    return eye.rotation.T @ drift, eye.rotation.T @ (state.spin - eye.spin)

@@ -15,7 +15,8 @@ from ..frames import Pose, direction
 from ..lidar.frame import LidarFrame
 from ..lidar.grid import LidarGrid, surface_area
 from ..randomness import frame_generator
-from ..scene.motion import BodyState, body_state
+from ..scene.motion import BodyState
+from ..scene.motion_of import ego_state
 from ..scene.world import World
 from .backend import choose_backend
 from .launch import Cells
@@ -256,7 +257,7 @@ def _hits(face: IntArray, cell: IntArray) -> tuple[IntArray, IntArray]:
 
 def _over_ground(columns: Columns, eye: BodyState) -> FloatArray:
     """Return velocities over ground in the sensor's axes; the tracer's are relative, in the frame that turns."""
-    spin = eye.rotation.T @ np.array([0.0, 0.0, eye.yaw_rate])
+    spin = eye.rotation.T @ eye.spin
     carried: FloatArray = eye.rotation.T @ eye.velocity + np.cross(spin, columns["position"])
     return np.asarray(columns["velocity"] + carried)
 
@@ -272,7 +273,7 @@ def _frame(
     normals: bool,
     materials: bool,
 ) -> LidarFrame:
-    ego = body_state(scene.ego.pose, scene.ego.velocity_mps, scene.ego.yaw_rate_deg_s, time)
+    ego = ego_state(scene, time)
     return LidarFrame(
         position=columns["position"],
         cos_incidence=columns["cos_incidence"],

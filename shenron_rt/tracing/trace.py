@@ -299,4 +299,4 @@ def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> C
 
 def _point_state(where: FloatArray, velocity: tuple[float, ...]) -> BodyState:
     """Return the state of a point that does not turn."""
-    return BodyState(np.eye(3), where, np.asarray(velocity, dtype=np.float64), 0.0)
+    return BodyState(np.eye(3), where, np.asarray(velocity, dtype=np.float64), np.zeros(3))
