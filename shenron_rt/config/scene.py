@@ -125,10 +125,34 @@ class StaticPart(MeshSource):
     id: ObjectId = 0
 
 
+class SpinningPart(ConfigModel):
+    """Parts of a mesh that turn about an axis: at a rate, or as a wheel that rolls on the ground.
+
+    ``part`` is a name of the mesh's own, ``*`` for any text; the turn is right-handed about ``axis``, and a wheel's
+    axis points to the left.
+    """
+
+    part: str
+    center_m: Vector3
+    axis: Vector3 = (0.0, 1.0, 0.0)
+    radius_m: Annotated[float, Field(gt=0)] | None = None
+    rate_deg_s: float = 0.0
+
+    @model_validator(mode="after")
+    def _one_rate(self) -> Self:
+        if not any(self.axis):
+            raise ValueError("axis: a direction is needed, got 0 0 0")
+        if (self.radius_m is None) == (self.rate_deg_s == 0):
+            raise ValueError("give either radius_m (a wheel that rolls) or rate_deg_s")
+        return self
+
+
 class Actor(Moving, MeshSource):
-    """A body that moves."""
+    """A body that moves; the wheels and limbs of ready-made ones with it where ``articulation`` is ``auto``."""
 
     id: ActorId
+    articulation: Literal["auto", "off"] = "auto"
+    spinning_parts: tuple[SpinningPart, ...] = ()
 
 
 class PointTarget(ConfigModel):

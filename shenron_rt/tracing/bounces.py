@@ -300,7 +300,7 @@ def _assembled(
         count=np.full(n, faces.shape[1], dtype=np.uint8),
         point=point,
         normal=normal * np.where(side > 0, -1.0, 1.0)[:, :, None],
-        velocity=world.drift[body] + np.cross(world.turn[body], point),
+        velocity=world.velocity_of(faces, point),
         material=world.face_material[faces],
         object_id=world.object_id[body],
         tag=world.face_tag[faces],

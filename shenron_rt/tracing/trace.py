@@ -239,10 +239,7 @@ def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns
     distance = np.abs(world.face_offset[face]) / cos
     position = d * distance[:, None]
     body = world.face_body[face]
-    velocity = world.drift[body]
-    turn = world.turn[body]
-    if np.any(world.turn):
-        velocity = velocity + np.cross(turn, position)
+    velocity = world.velocity_of(face, position)
     return {
         "position": position,
         "range_rate": np.einsum("ij,ij->i", velocity, d),

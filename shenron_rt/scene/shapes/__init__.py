@@ -8,13 +8,13 @@ import numpy as np
 
 from ..mesh import Part, TaggedMesh
 from . import canonical, people, road, vegetation
-from ._piece import Piece
+from ._piece import Piece, Wheel
 from ._text import Recipe, parse
-from .bicycle import bicycle
-from .car import car
-from .truck import truck
+from .bicycle import bicycle, bicycle_wheels, ridden
+from .car import car, car_wheels
+from .truck import truck, truck_wheels
 
-__all__ = ["SHAPES", "make_shape"]
+__all__ = ["SHAPES", "Wheel", "make_jointed", "make_shape", "wheels_of"]
 
 #: Every shape by name.
 SHAPES: dict[str, Recipe] = {
@@ -35,6 +35,31 @@ SHAPES: dict[str, Recipe] = {
     "bicycle": Recipe(bicycle),
     "pedestrian": Recipe(people.pedestrian, (), {"h": 1.75, "stride": 0.6}),
 }
+
+
+def wheels_of(name: str) -> tuple[Wheel, ...]:
+    """Return the wheels of a ready-made shape; none where it has none."""
+    known = {"car": car_wheels, "truck": truck_wheels, "bicycle": bicycle_wheels}
+    return known[name]() if name in known else ()
+
+
+def make_jointed(text: str) -> tuple[TaggedMesh, float]:
+    """Return a ready-made shape in pieces that can move by themselves, and its height [m].
+
+    The pedestrian stands straight and is cut at hips, knees, shoulders and elbows; the bicycle has a piece for each rim
+    and tyre; all others are as they are.
+
+    Raises
+    ------
+    InputError
+        As :func:`make_shape`.
+    """
+    name, parameters = parse(text, SHAPES)
+    if name == "pedestrian":
+        mesh = _assemble(name, str(text).strip(), people.walker(float(parameters["h"])))
+    else:
+        mesh = _assemble(name, text, ridden()) if name == "bicycle" else make_shape(text)
+    return mesh, float(mesh.bounds[1, 2])
 
 
 def make_shape(text: str) -> TaggedMesh:

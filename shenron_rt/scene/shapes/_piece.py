@@ -14,6 +14,7 @@ __all__ = [
     "LATTICE",
     "SAGITTA",
     "Piece",
+    "Wheel",
     "box",
     "ellipsoid",
     "fine_edge",
@@ -36,6 +37,25 @@ SAGITTA = 6.5e-6
 LATTICE = 1.7e-3
 
 _SMALLEST_RING = 12
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A wheel of a ready-made vehicle: it turns about an axle along y.
+
+    Parameters
+    ----------
+    part : str
+        Pattern that the names of its pieces match, ``*`` for any text.
+    center : (3,) float
+        Of its hub, frame of the shape [m].
+    radius : float
+        [m].
+    """
+
+    part: str
+    center: tuple[float, float, float]
+    radius: float
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 from ..._typing import BoolArray, FloatArray, IntArray
 from ...tags import SemanticTag
 from ._car_body import AXLES, WHEEL_RADIUS, Shell, columns, shell, tuck
-from ._piece import Piece, ellipsoid, grid, revolve
+from ._piece import Piece, Wheel, ellipsoid, grid, revolve
 
-__all__ = ["car"]
+__all__ = ["car", "car_wheels"]
 
 _HEIGHT = 1.45
 _TRACK = 0.76
@@ -34,6 +34,15 @@ def car() -> list[Piece]:
     pieces.append(Piece("front plate", "metal", SemanticTag.Car, *_number_plate(0.0, 0.42)))
     pieces.append(Piece("rear plate", "metal", SemanticTag.Car, *_number_plate(np.pi, 0.80)))
     return pieces
+
+
+def car_wheels() -> tuple[Wheel, ...]:
+    """Return its four wheels."""
+    return tuple(
+        Wheel(f"{where} {side} [tr]*", (axle, sign * _TRACK, WHEEL_RADIUS), WHEEL_RADIUS)
+        for axle, where in zip(AXLES, ("front", "rear"), strict=True)
+        for sign, side in ((1.0, "left"), (-1.0, "right"))
+    )
 
 
 def _body() -> list[Piece]:

@@ -8,7 +8,7 @@ from ..._typing import FloatArray, IntArray
 from ...tags import SemanticTag
 from ._piece import Piece, ellipsoid, grid, join, tube
 
-__all__ = ["pedestrian"]
+__all__ = ["ARM", "LEG", "pedestrian", "walker"]
 
 # Body proportions at a height of 1.80 m, after the adult target of ISO 19206-2: shoulders 0.50 m wide, hip at 0.92 m.
 _TARGET_HEIGHT = 1.80
@@ -45,6 +45,41 @@ def pedestrian(h: float = 1.75, stride: float = 0.6) -> list[Piece]:
         Piece(name, material, SemanticTag.Pedestrians, vertices * [scale, scale, h / top_of_head], faces)
         for name, material, patches in parts
         for vertices, faces in [join(*patches)]
+    ]
+
+
+#: Joints of the walker for a height of 1.80 m: y to either side and heights of hip, knee, shoulder and elbow [m].
+LEG = {"y": 0.10, "hip": 0.92, "knee": 0.51}
+ARM = {"y": 0.24, "shoulder": 1.43, "elbow": 1.14}
+
+
+def walker(h: float = 1.75) -> list[Piece]:
+    """Return an adult of height ``h`` facing +x, standing straight, in pieces cut at the joints [m].
+
+    Torso, head, and for each side thigh, lower leg, shoe, upper arm, lower arm and hand. The cuts overlap, so that a
+    bent limb has no gap.
+    """
+    cloth = [("torso", _torso(0.0))]
+    skin = [("head", join(ellipsoid([0.105, 0.08, 0.135], 12, [0.02, 0.0, 1.665]), _neck(0.0)))]
+    shoes = []
+    for sign, side in ((1.0, "left"), (-1.0, "right")):
+        leg, arm = sign * LEG["y"], sign * ARM["y"]
+        limbs = (
+            ("thigh", leg, LEG["hip"], LEG["knee"], 0.085, 0.062, 20),
+            ("lower leg", leg, LEG["knee"], 0.10, 0.062, 0.045, 20),
+            ("upper arm", arm, ARM["shoulder"], ARM["elbow"], 0.055, 0.045, 16),
+            ("lower arm", arm, ARM["elbow"], 0.86, 0.045, 0.035, 16),
+        )
+        for name, y, top, bottom, wide, narrow, n in limbs:
+            path = np.column_stack([np.zeros(5), np.full(5, y), np.linspace(top + 0.02, bottom - 0.02, 5)])
+            cloth.append((f"{side} {name}", tube(path, np.linspace(wide, narrow, 5), n)))
+        shoes.append((f"{side} shoe", ellipsoid([0.14, 0.05, 0.06], 5, [0.05, leg, 0.06])))
+        skin.append((f"{side} hand", ellipsoid([0.04, 0.03, 0.08], 4, [0.0, arm, 0.81])))
+    scale = h / _TARGET_HEIGHT
+    return [
+        Piece(name, material, SemanticTag.Pedestrians, vertices * scale, faces)
+        for material, patches in (("clothing", cloth), ("skin", skin), ("rubber", shoes))
+        for name, (vertices, faces) in patches
     ]
 
 

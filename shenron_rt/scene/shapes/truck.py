@@ -7,9 +7,9 @@ import numpy as np
 from ..._typing import FloatArray, IntArray
 from ...tags import SemanticTag
 from ._outline import half_outline
-from ._piece import Piece, box, grid, join, revolve
+from ._piece import Piece, Wheel, box, grid, join, revolve
 
-__all__ = ["truck"]
+__all__ = ["truck", "truck_wheels"]
 
 _LENGTH, _WIDTH, _HEIGHT = 8.0, 2.5, 3.6
 _FLOOR = 1.05
@@ -20,6 +20,7 @@ _BULGE = 0.03
 _PANEL_FACET = 0.2
 _WHEEL_RADIUS, _WHEEL_WIDTH = 0.48, 0.30
 _AXLES = (2.75, -2.1)
+_HUB = _WIDTH / 2.0 - _WHEEL_WIDTH / 2.0 - 0.03
 
 
 def truck() -> list[Piece]:
@@ -47,8 +48,17 @@ def truck() -> list[Piece]:
     for axle, where in zip(_AXLES, ("front", "rear"), strict=True):
         for side, name in ((1.0, "left"), (-1.0, "right")):
             wheel = Piece(f"{where} {name} wheel", "rubber", SemanticTag.Truck, *tyre)
-            pieces.append(wheel.moved([axle, side * (_WIDTH / 2.0 - half - 0.03), _WHEEL_RADIUS], lying))
+            pieces.append(wheel.moved([axle, side * _HUB, _WHEEL_RADIUS], lying))
     return pieces
+
+
+def truck_wheels() -> tuple[Wheel, ...]:
+    """Return its four wheels."""
+    return tuple(
+        Wheel(f"{where} {side} wheel", (axle, sign * _HUB, _WHEEL_RADIUS), _WHEEL_RADIUS)
+        for axle, where in zip(_AXLES, ("front", "rear"), strict=True)
+        for sign, side in ((1.0, "left"), (-1.0, "right"))
+    )
 
 
 def _placed(surface: tuple[FloatArray, IntArray], xyz: list[float]) -> tuple[FloatArray, IntArray]:
