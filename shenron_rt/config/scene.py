@@ -21,8 +21,8 @@ from .loader import apply_overrides, read_yaml, validate_model
 from .profile import RadarProfile, load_profile
 
 __all__ = [
-    "Actor", "Ego", "Keyframe", "LidarMount", "MeshSource", "Moving", "PointTarget", "RadarMount", "Scene", "StaticPart",
-    "load_scene",
+    "Actor", "Ego", "Keyframe", "LidarMount", "MeshSource", "Moving", "PointTarget", "RadarMount", "Scene",
+    "SpinningPart", "StaticPart", "load_scene",
 ]  # fmt: skip
 
 ZERO = (0.0, 0.0, 0.0)
@@ -151,7 +151,7 @@ class Actor(Moving, MeshSource):
     """A body that moves; the wheels and limbs of ready-made ones with it where ``articulation`` is ``auto``."""
 
     id: ActorId
-    articulation: Literal["auto", "off"] = "auto"
+    articulation: Literal["auto", "off"] = "off"
     spinning_parts: tuple[SpinningPart, ...] = ()
 
 

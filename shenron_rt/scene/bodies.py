@@ -174,7 +174,7 @@ def _unshared(mesh: TaggedMesh, face_link: IntArray) -> tuple[TaggedMesh, IntArr
 
 
 def _planes(mesh: TaggedMesh, material: IntArray, link: IntArray) -> IntArray:
-    """Return (f,) int32, equal for faces of one link that lie in one plane (to a micrometre) and are of one material."""
+    """Return (f,) int32, equal for faces of one link and material that lie in one plane, to a micrometre."""
     normal = mesh.face_normal
     # either side of a plane is the same plane: make the largest component positive
     largest = np.take_along_axis(normal, np.abs(normal).argmax(axis=1)[:, None], axis=1)

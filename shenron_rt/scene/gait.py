@@ -1,12 +1,12 @@
 """How a person walks: angles of hips, knees, shoulders and elbows over the cycle of two steps.
 
 R. Boulic, N. Magnenat Thalmann, D. Thalmann, "A global human walking model with real-time kinematic personification",
-The Visual Computer 6 (1990) 344-358, the model that V. C. Chen, "The Micro-Doppler Effect in Radar" (Artech House, 2011)
-takes for walking people. Its parameter is the speed over the length of the leg, RV [1/s].
+The Visual Computer 6 (1990) 344-358; V. C. Chen, "The Micro-Doppler Effect in Radar" (Artech House, 2011), takes it for
+walking people. Its parameter is the speed over the length of the leg, RV [1/s].
 
-Taken over: length and duration of the cycle, flexing at hip, knee, shoulder and elbow. Left out: the centimetres by which
-pelvis and thorax rise, sway and twist, and the ankle. Assumption: control points are joined by cubics that are level at
-each of them, which is the monotone cubic of the paper's figures but at the elbow.
+Taken over: length and duration of the cycle, flexing at hip, knee, shoulder and elbow. Left out: the centimetres by
+which pelvis and thorax rise, sway and twist, and the ankle. Assumption: control points are joined by cubics that are
+level at each of them, which is the monotone cubic of the paper's figures but at the elbow.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ def read_recording(
     Parameters
     ----------
     path : path
-        CSV with the columns ``t_s x_m y_m z_m yaw_deg pitch_deg roll_deg`` and, with several vehicles, ``id``; JSON with
-        a list of ``{t_s, xyz_m, ypr_deg}`` or a mapping of id to such lists; a folder of side files
+        CSV with the columns ``t_s x_m y_m z_m yaw_deg pitch_deg roll_deg`` and, with several vehicles, ``id``; JSON
+        with a list of ``{t_s, xyz_m, ypr_deg}`` or a mapping of id to such lists; a folder of side files
         (``*.meta.yaml``) of ``examples/carla_recorder.py``, whose first tick is 0 s.
     number : int, optional
         Which vehicle; of a folder of side files, ``None`` is the ego vehicle.

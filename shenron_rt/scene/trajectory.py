@@ -41,16 +41,16 @@ class Trajectory:
 
     Notes
     -----
-    Between keyframes the position is the cubic Hermite polynomial of the two positions and velocities. The velocity at a
-    keyframe is that of the parabola through it and its two neighbours, so that constant acceleration is exact and a
+    Between keyframes the position is the cubic Hermite polynomial of the two positions and velocities. The velocity at
+    a keyframe is that of the parabola through it and its two neighbours, so that constant acceleration is exact and a
     circle errs by h^2 / 6 of its third derivative; beside an interval in which the body stands still it is zero, so
     that a car that stops does not roll back. The rotation from one keyframe to the next is exp(q(t)), q the cubic
     Hermite polynomial from 0 to the shortest rotation vector, its ends matched to angular velocities found in the same
     way; so pose, velocity and angular velocity are continuous. ``velocity`` and ``spin`` of a state are the exact
     derivatives of its pose.
 
-    Up to one keyframe interval beyond either end, velocity and angular velocity of that end go on: mid-frame of the last
-    frame of a recording lies there.
+    Up to one keyframe interval beyond either end, velocity and angular velocity of that end go on: mid-frame of the
+    last frame of a recording lies there.
     """
 
     time_s: FloatArray

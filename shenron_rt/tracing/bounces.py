@@ -20,8 +20,8 @@ import numpy as np
 from .._typing import BoolArray, FloatArray, IntArray
 from ..paths import Paths
 from ..scene.world import World
-from .caster import RayCaster
 from .launch import Cells
+from .world_caster import WorldCaster
 
 __all__ = ["MIRROR_M2", "trace_paths"]
 
@@ -59,7 +59,7 @@ class _Tubes:
 
 def trace_paths(
     world: World,
-    caster: RayCaster,
+    caster: WorldCaster,
     cells: Cells,
     face: IntArray,
     cell: IntArray,
@@ -72,7 +72,7 @@ def trace_paths(
     Parameters
     ----------
     world : World
-    caster : RayCaster
+    caster : WorldCaster
     cells : Cells
     face : (m,) int
         Face that each of the cells hits first.
@@ -116,12 +116,12 @@ def _lifted(point: FloatArray, normal: FloatArray) -> FloatArray:
     return np.asarray(point + height[:, None] * normal)
 
 
-def _cast(caster: RayCaster, origin: FloatArray, direction: FloatArray) -> IntArray:
+def _cast(caster: WorldCaster, origin: FloatArray, direction: FloatArray) -> IntArray:
     d, o = (np.ascontiguousarray(a.T, dtype=np.float32) for a in (direction, origin))
     return caster.cast(d, o)
 
 
-def _bounced(world: World, caster: RayCaster, tubes: _Tubes) -> _Tubes:
+def _bounced(world: World, caster: WorldCaster, tubes: _Tubes) -> _Tubes:
     """Return the tubes after one more reflection, those that hit something."""
     point = tubes.points[-1]
     normal = _facing(world, tubes.faces[-1], tubes.direction)
@@ -149,7 +149,7 @@ def _bounced(world: World, caster: RayCaster, tubes: _Tubes) -> _Tubes:
     return moved.select(good)
 
 
-def _paths(world: World, caster: RayCaster, tubes: _Tubes, wavenumber: float) -> Paths:
+def _paths(world: World, caster: WorldCaster, tubes: _Tubes, wavenumber: float) -> Paths:
     """Return the ways back from the last hits of tubes to the radar that matter."""
     mirror = [world.face_patch[face] >= MIRROR_M2 for face in tubes.faces]
     beamless = np.flatnonzero(~mirror[-1] | mirror[-2])
@@ -163,7 +163,7 @@ def _paths(world: World, caster: RayCaster, tubes: _Tubes, wavenumber: float) ->
 
 
 def _received(
-    world: World, caster: RayCaster, tubes: _Tubes, eye: FloatArray, plane: IntArray | None, wavenumber: float
+    world: World, caster: WorldCaster, tubes: _Tubes, eye: FloatArray, plane: IntArray | None, wavenumber: float
 ) -> Paths:
     """Return the paths from the last hits of tubes to the radar at ``eye`` (n, 3), or its images in planes."""
     kept = _nearly_stationary(world, tubes, eye, wavenumber)
@@ -189,7 +189,7 @@ def _received(
     return _assembled(world, tubes, radiates, area, slope[flat], curvature[flat])
 
 
-def _reaches(world: World, caster: RayCaster, start: FloatArray, end: FloatArray) -> IntArray:
+def _reaches(world: World, caster: WorldCaster, start: FloatArray, end: FloatArray) -> IntArray:
     """Return the rows of pairs of points with nothing between them."""
     way = end - start
     length = np.linalg.norm(way, axis=1)
@@ -201,7 +201,7 @@ def _reaches(world: World, caster: RayCaster, start: FloatArray, end: FloatArray
 
 
 def _reflected_back(
-    world: World, caster: RayCaster, start: FloatArray, side: FloatArray, image: FloatArray, face: IntArray
+    world: World, caster: WorldCaster, start: FloatArray, side: FloatArray, image: FloatArray, face: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """Return which points, lit on one side, see the radar in the planes of some faces, and (n, 3) where on them."""
     normal = world.face_normal[face]

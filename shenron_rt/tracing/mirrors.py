@@ -11,9 +11,9 @@ from ..paths import Paths
 from ..randomness import frame_generator
 from ..scene.world import World
 from .bounces import MIRROR_M2, trace_paths
-from .caster import RayCaster
 from .launch import aimed_cells
 from .launches import Launch, launch_directions
+from .world_caster import WorldCaster
 
 __all__ = ["Image", "bounced_paths", "image_launches"]
 
@@ -28,7 +28,7 @@ class Image:
 
 
 def image_launches(
-    world: World, caster: RayCaster, aimed: dict[int, Launch], seed: int, frame: int, radar: str
+    world: World, caster: WorldCaster, aimed: dict[int, Launch], seed: int, frame: int, radar: str
 ) -> list[Image]:
     """Return launches at the mirror images of aimed bodies, in the large planes that show them to the radar."""
     large = np.flatnonzero(world.face_patch >= MIRROR_M2)
@@ -60,7 +60,7 @@ def image_launches(
 
 def bounced_paths(
     world: World,
-    caster: RayCaster,
+    caster: WorldCaster,
     launches: list[Launch],
     parts: list[IntArray],
     hits: list[IntArray],

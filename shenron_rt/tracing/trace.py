@@ -21,10 +21,10 @@ from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
 from .backend import Backend, choose_backend
-from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
 from .launches import Launch, launch_directions
 from .mirrors import bounced_paths, image_launches
+from .world_caster import WorldCaster, anchor
 
 __all__ = ["trace"]
 
@@ -128,7 +128,7 @@ def _aims(world: World, seed: int, frame: int, radar: str) -> dict[int, Launch]:
 
 
 def _cast(
-    world: World, caster: RayCaster, launches: list[Launch], aimed: list[int]
+    world: World, caster: WorldCaster, launches: list[Launch], aimed: list[int]
 ) -> tuple[list[IntArray], list[IntArray]]:
     """Return the face that each cell of each launch hits, and the cells that count; the first launch is the grid."""
     face = caster.cast(launch_directions(launches))
@@ -159,19 +159,28 @@ class _SceneKey:
         return isinstance(other, _SceneKey) and other.scene is self.scene
 
 
-_last: dict[str, tuple[object, World, RayCaster]] = {}
+_last: dict[str, tuple[object, World, WorldCaster]] = {}
 
 
-def _prepared(scene: Scene, mount: Placed, time: float, backend: Backend) -> tuple[World, RayCaster]:
-    """Return world and caster, kept from the last call when scene, radar pose and instant are the same."""
-    key = (_SceneKey(scene), mount, time, backend)
-    if "world" in _last and _last["world"][0] == key:
-        return _last["world"][1:]
+def _prepared(scene: Scene, mount: Placed, time: float, backend: Backend) -> tuple[World, WorldCaster]:
+    """Return world and caster: those of the last call at the same instant, else with what moves where it is now."""
+    scene_key, key = (_SceneKey(scene), backend), (_SceneKey(scene), mount, time, backend)
+    before = _last.get("world")
+    if before is not None and before[0] == key:
+        return before[1:]
     bodies, materials = _bodies_of(_SceneKey(scene))
     world = build_world(scene, mount, time, bodies, materials)
-    caster = RayCaster(world.vertices, world.faces, backend)
+    caster = _casters.get(scene_key)
+    if caster is None:
+        _casters.clear()  # of one scene at a time: a town's search tree takes hundreds of megabytes
+        caster = _casters[scene_key] = WorldCaster(world, anchor(scene), backend)
+    else:
+        caster.place(world)
     _last["world"] = (key, world, caster)
     return world, caster
+
+
+_casters: dict[tuple[_SceneKey, Backend], WorldCaster] = {}
 
 
 def _launch_pattern(profile: RadarProfile, rays: int, seed: int, frame: int, radar: str) -> Launch:
@@ -257,7 +266,7 @@ def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns
     }
 
 
-def _point_rows(scene: Scene, world: World, caster: RayCaster, time: float) -> Columns:
+def _point_rows(scene: Scene, world: World, caster: WorldCaster, time: float) -> Columns:
     """Return the columns of the point targets nothing stands before."""
     targets, eye = scene.point_targets, world.radar_state
     where = np.array([np.add(t.xyz_m, np.multiply(t.velocity_mps, time)) for t in targets]).reshape(-1, 3)
