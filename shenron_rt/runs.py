@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from .errors import InputError, NotFoundError
+from .run_frames import write_frame
 
 if TYPE_CHECKING:
     from .dsp import Detections, RadarCube
@@ -165,18 +166,6 @@ def _move_into_place(partial: Path, folder: Path, overwrite: bool) -> bool:
 def frame_folder(root: Path, radar: str, frame: int) -> Path:
     """Return ``root/radars/<radar>/frame_000000``."""
     return root / "radars" / radar / f"frame_{frame:06d}"
-
-
-def write_frame(folder: Path, frame: FrameLike) -> None:
-    """Write the arrays and the detections of one frame; keys are the attribute names."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in ("scatterers", "returns", "adc", "cube"):
-        stage = getattr(frame, name, None)
-        if stage is not None:
-            stage.save(folder / f"{name}.npz")
-    table = frame.detections.to_csv(folder / "detections.csv")
-    if any(">" in chain for chain in frame.detections.chain):  # else each is its object, as who reads the table knows
-        frame.detections.save_chains(table)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -29,7 +29,7 @@ LAYERS = (
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable",),
-    ("runs",),
+    ("runs", "run_frames"),
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page
     ("cli",),

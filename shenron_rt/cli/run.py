@@ -52,6 +52,7 @@ def run(
     accuracy: float | None = None,
     model: str | None = None,
     pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
+    write: str | None = None,
     json_: Json = False,
 ) -> int:
     """Render a scene: scatterers, ADC cube, maps, detections and pictures of every radar.
@@ -74,9 +75,13 @@ def run(
         Of the ADC synthesis, relative to the RMS of the cube. Default: 1e-5.
     model
         Echo model: physical, shenron, shenron:as_released, with switches as in shenron:corrected-r4. Default: physical.
+    write
+        What to keep of every frame, with commas: scatterers, returns, adc, cube, maps (a part of cube), detections.
+        Default: all of it.
     """
     from .. import runs
     from ..config.scene import load_scene
+    from ..run_frames import parts_of
 
     overrides = Overrides(set_)
     loaded = load_scene(scene, overrides.scene)
@@ -84,7 +89,7 @@ def run(
         "frames": frames, "rays": rays, "max_bounces": max_bounces, "backend": backend, "accuracy": accuracy,
         "model": model,
     }  # fmt: skip
-    options = _options(loaded.run, given)
+    options, keep = _options(loaded.run, given), parts_of(write)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
     if not loaded.radars:
@@ -92,7 +97,7 @@ def run(
     default = partial(runs.default_folder, loaded.name, _profile_label(loaded))
     started = clock.perf_counter()
     with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
-        summary = _render(loaded, options, place.partial, pictures=pictures, quiet=json_)
+        summary = _render(loaded, options, place.partial, keep=keep, pictures=pictures, quiet=json_)
         runs.write_json(place.partial / "summary.json", summary)
         _write_config(place.partial / "config.yaml", loaded)
     if json_:
@@ -162,7 +167,9 @@ def _profile_label(scene: Scene) -> str:
     return "+".join(dict.fromkeys(scene.profile_of(r).name for r in scene.radars))
 
 
-def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quiet: bool) -> dict[str, Any]:
+def _render(
+    scene: Scene, options: _Options, root: Path, *, keep: tuple[str, ...], pictures: bool, quiet: bool
+) -> dict[str, Any]:
     """Write every frame of every radar and return the summary."""
     from .. import runs
     from ..pipeline import simulate
@@ -192,7 +199,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
                     model=options.model,
                 )
                 folder = runs.frame_folder(root, mount.name, index)
-                runs.write_frame(folder, frame)
+                runs.write_frame(folder, frame, keep)
                 if pictures:
                     _draw(folder, scene, mount, used, frame, first=index == wanted.start)
                 records.append(runs.frame_summary(frame, names))

@@ -49,6 +49,10 @@ class World:
         A point p of link l moves at drift[l] + turn[l] x p relative to the radar [m/s].
     turn : (l, 3) float
         [rad/s].
+    link_rotation : (l, 3, 3) float
+        From the frame of a link's mesh to the radar's.
+    link_origin : (l, 3) float
+        [m].
     materials : MaterialTable
     radar_state : BodyState
         The radar in the world frame.
@@ -68,6 +72,8 @@ class World:
     vertex_start: IntArray
     drift: FloatArray
     turn: FloatArray
+    link_rotation: FloatArray
+    link_origin: FloatArray
     materials: MaterialTable
     radar_state: BodyState
 
@@ -159,6 +165,8 @@ def build_world(scene: Scene, radar: Placed, time: float, bodies: tuple[Body, ..
         vertex_start=fixed.vertex_start,
         drift=_stack([p.drift for p in placed], (0, 3), np.float64),
         turn=_stack([p.turn for p in placed], (0, 3), np.float64),
+        link_rotation=_stack([p.rotation for p in placed], (0, 3, 3), np.float64),
+        link_origin=_stack([p.origin for p in placed], (0, 3), np.float64),
         materials=materials,
         radar_state=eye,
     )
@@ -172,30 +180,41 @@ class _Placed:
     normals: FloatArray
     drift: FloatArray
     turn: FloatArray
+    rotation: FloatArray
+    origin: FloatArray
 
 
 def _placed(scene: Scene, body: Body, time: float, eye: BodyState) -> _Placed:
     """Return a body at ``time`` as seen from ``eye``."""
     state = state_of(body.source, scene.folder, time)
-    vertices, normals = body.mesh.vertices, body.mesh.face_normal
-    states = [state]
+    states, turned, moved = [state], [np.eye(3)], [np.zeros(3)]
     if len(body.links) > 1:
         ride = ride_of(body.source, scene.folder, time)
-        own = [link.motion.at(ride) for link in body.links[1:] if link.motion is not None]
-        states += [state.carrying(motion) for motion in own]
-        turned = np.stack([np.eye(3), *(m.rotation for m in own)])
-        moved = np.stack([np.zeros(3), *(m.origin for m in own)])
-        vertices = np.einsum("vij,vj->vi", turned[body.vertex_link], vertices) + moved[body.vertex_link]
-        normals = np.einsum("fij,fj->fi", turned[body.face_link], normals)
-    rotation = eye.rotation.T @ state.rotation
-    origin = eye.rotation.T @ (state.origin - eye.origin)
+        for link in body.links[1:]:
+            if link.motion is not None:
+                own = link.motion.at(ride)
+                states.append(state.carrying(own))
+                turned.append(own.rotation)
+                moved.append(own.origin)
+    to_radar = eye.rotation.T @ state.rotation
+    rotation = to_radar @ np.stack(turned)
+    origin = np.stack(moved) @ to_radar.T + eye.rotation.T @ (state.origin - eye.origin)
     motion = [relative_motion(s, eye) for s in states]
     return _Placed(
-        vertices @ rotation.T + origin,
-        normals @ rotation.T,
+        _moved(body.mesh.vertices, rotation, body.vertex_link) + origin[body.vertex_link],
+        _moved(body.mesh.face_normal, rotation, body.face_link),
         np.stack([drift for drift, _ in motion]),
         np.stack([turn for _, turn in motion]),
+        rotation,
+        origin,
     )
+
+
+def _moved(rows: FloatArray, rotation: FloatArray, link: IntArray) -> FloatArray:
+    """Return (n, 3) rows turned by the rotation of their link."""
+    if len(rotation) == 1:
+        return np.asarray(rows @ rotation[0].T)
+    return np.einsum("nij,nj->ni", rotation[link], rows)
 
 
 def _stack(items: list[NDArray[Any]], empty: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .._typing import FloatArray, IntArray, NDArray
 from ..config.scene import Scene
-from ..scene.bodies import Body
 from ..scene.motion_of import trajectory_of
 from ..scene.world import World
 from .backend import Backend
 from .caster import RayCaster
 
 __all__ = ["WorldCaster", "anchor"]
+
+#: Moving rigid parts of this many triangles have a search tree of their own; below, fitting it anew each frame is less
+#: work than casting at one more scene.
+_OWN_TREE = 1000
+#: No more of them than this: each takes a pass over the rays.
+_MOST_TREES = 32
+#: Added to the sphere about a part, far above what float32 loses at its distance [m].
+_SLACK_M = 0.05
 
 
 def anchor(scene: Scene) -> FloatArray:
@@ -22,19 +31,41 @@ def anchor(scene: Scene) -> FloatArray:
     return np.asarray(np.round(start))
 
 
+@dataclass(frozen=True, eq=False)
+class _Rigid:
+    """Triangles that keep their places among themselves, in a frame of their own: their search tree is built once.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    rows : (f + 1,) int32
+        Of the world's faces; the last, -1, answers for a miss.
+    center : (3,) float
+    radius : float
+        Of a sphere that holds them, infinite for what is everywhere [m].
+    link : int
+        Of the world; -1 for what stands still.
+    """
+
+    caster: RayCaster
+    rows: IntArray
+    center: FloatArray
+    radius: float
+    link: int
+
+
 class WorldCaster:
     """Casts rays of a radar at a world; :meth:`place` makes it the next instant's.
 
-    Two sets of triangles. What never moves keeps its place in the world, about a point near the start of the ego
-    vehicle, and the rays are taken there: neither its vertices nor its search tree are touched again. What moves is
-    placed in the frame of the radar, which moves vertices of a mesh that stays. Which face is nearest where both are
-    hit follows from their planes in float64.
+    What never moves keeps its place in the world, about a point near the start of the ego vehicle; each large rigid part
+    that moves keeps its own frame. Rays are taken there, so that neither vertices nor search trees are touched again.
+    Small parts that move, of which there may be thousands, are one mesh in the frame of the radar whose vertices move.
+    Which face is nearest where several are hit follows from their planes in float64.
 
     Parameters
     ----------
     world : World
-    bodies : tuple of Body
-        Of the world.
+        At any instant.
     anchor : (3,) float
         A point of the world near where the radar will be [m].
     backend : str
@@ -43,30 +74,28 @@ class WorldCaster:
     def __init__(self, world: World, anchor: FloatArray, backend: Backend) -> None:
         self.backend: Backend = backend
         self._anchor = anchor
-        moves = np.array([b.moves for b in world.bodies], dtype=bool)
-        self._rows = [np.flatnonzero(moves[world.face_body] == kind).astype(np.int32) for kind in (False, True)]
-        self._vertices = np.flatnonzero(np.repeat(moves, np.diff(world.vertex_start)))
-        still = [_in_world(b, anchor) for b in world.bodies]
-        points = np.concatenate(still) if still else np.zeros((0, 3))
-        self._still = RayCaster(*_compact(points, world.faces[self._rows[0]]), backend)
-        self._moving = RayCaster(world.vertices[self._vertices], self._renumbered(world), backend)
-        self._take(world)
-
-    def _renumbered(self, world: World) -> IntArray:
-        number = np.zeros(len(world.vertices), dtype=np.int32)
-        number[self._vertices] = np.arange(len(self._vertices), dtype=np.int32)
-        return number[world.faces[self._rows[1]]]
-
-    def _take(self, world: World) -> None:
+        links = np.concatenate([[0], np.cumsum([len(b.links) for b in world.bodies])]).astype(np.int64)
+        moves = np.array([b.moves for b in world.bodies for _ in b.links], dtype=bool)
+        size = np.bincount(world.face_link, minlength=int(links[-1]))
+        own = np.flatnonzero(moves & (size >= _OWN_TREE))
+        own = own[np.argsort(-size[own], kind="stable")][:_MOST_TREES]
+        self._rigid = []
+        still = np.flatnonzero(~moves[world.face_link]) if world.face_link.size else np.zeros(0, np.int64)
+        if still.size:
+            self._rigid.append(_rigid(_at_rest(world, anchor), world, still, -1, backend))
+        for link in sorted(own.tolist()):
+            rest = np.concatenate([b.mesh.vertices for b in world.bodies])
+            self._rigid.append(_rigid(rest, world, np.flatnonzero(world.face_link == link), link, backend))
+        loose = np.flatnonzero(moves[world.face_link] & ~np.isin(world.face_link, own))
+        self._loose_rows = np.append(loose, -1).astype(np.int32)
+        self._loose_vertices, faces = _used(world.faces[loose])
+        self._loose = RayCaster(world.vertices[self._loose_vertices], faces, backend)
         self._world = world
-        eye = world.radar_state
-        self._turn = eye.rotation.astype(np.float32)
-        self._eye = (eye.origin - self._anchor).astype(np.float32)
 
     def place(self, world: World) -> None:
         """Make this the caster of another instant, or another radar, of the same scene."""
-        self._take(world)
-        self._moving.move(world.vertices[self._vertices])
+        self._world = world
+        self._loose.move(world.vertices[self._loose_vertices])
 
     def cast(self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None) -> IntArray:
         """Return (n,) int32 row of the nearest face along each direction, -1 where nothing is hit.
@@ -78,26 +107,42 @@ class WorldCaster:
         origins : (3, n) float32, optional
             Where each ray starts; default: at the radar [m].
         """
-        moving = self._row(self._moving.cast(directions, origins) if self._moving.n_faces else None, 1, directions)
-        if not self._still.n_faces:
-            return moving
-        eye = self._eye[:, None]
-        start = eye if origins is None else _turned(self._turn, origins) + eye
-        still = self._row(self._still.cast(_turned(self._turn, directions), start), 0, directions)
-        if not self._moving.n_faces:
-            return still
-        nearest = np.where(moving >= 0, moving, still)
-        both = np.flatnonzero((moving >= 0) & (still >= 0))
-        d, o = directions[:, both], None if origins is None else origins[:, both]
-        behind = self._distance(still[both], d, o) < self._distance(moving[both], d, o)
-        nearest[both[behind]] = still[both[behind]]
+        nearest = self._loose_rows[self._loose.cast(directions, origins)]
+        for rigid in self._rigid:
+            rotation, shift = self._pose(rigid)  # radar to the part's frame
+            rays = _towards(rigid, rotation, shift, directions, origins)
+            d, o = (directions, origins) if rays is None else (directions[:, rays], _columns(origins, rays))
+            start = shift[:, None] if o is None else _turned(rotation, o) + shift[:, None]
+            hit = rigid.rows[rigid.caster.cast(_turned(rotation, d), start)]
+            self._merge(nearest, hit, rays, directions, origins)
         return nearest
 
-    def _row(self, hit: IntArray | None, kind: int, directions: NDArray[np.float32]) -> IntArray:
-        """Return the rows of the world's faces for those of one of the two sets."""
-        if hit is None:
-            return np.full(directions.shape[1], -1, dtype=np.int32)
-        return np.append(self._rows[kind], np.int32(-1))[hit]
+    def _pose(self, rigid: _Rigid) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return rotation and shift from the radar's frame to that of a rigid part."""
+        world = self._world
+        if rigid.link < 0:
+            eye = world.radar_state
+            return eye.rotation.astype(np.float32), (eye.origin - self._anchor).astype(np.float32)
+        back = world.link_rotation[rigid.link].T
+        return back.astype(np.float32), (-back @ world.link_origin[rigid.link]).astype(np.float32)
+
+    def _merge(
+        self,
+        nearest: IntArray,
+        hit: IntArray,
+        rays: IntArray | None,
+        directions: NDArray[np.float32],
+        origins: NDArray[np.float32] | None,
+    ) -> None:
+        """Put hits of some rays (None: all) into ``nearest`` where they are nearer than what is there."""
+        found = np.flatnonzero(hit >= 0)
+        ray = found if rays is None else rays[found]
+        hit = hit[found]
+        both = np.flatnonzero(nearest[ray] >= 0)
+        d, o = directions[:, ray[both]], _columns(origins, ray[both])
+        behind = self._distance(nearest[ray[both]], d, o) <= self._distance(hit[both], d, o)
+        hit[both[behind]] = nearest[ray[both[behind]]]
+        nearest[ray] = hit
 
     def _distance(self, face: IntArray, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> FloatArray:
         """Return how far each ray goes to the plane of a face [m]."""
@@ -109,18 +154,53 @@ class WorldCaster:
         return np.asarray(np.abs(height) / np.maximum(np.abs(along), 1e-12))
 
 
-def _in_world(body: Body, anchor: FloatArray) -> FloatArray:
-    """Return the vertices of a body that stands still, relative to the anchor; of one that moves, as they are."""
-    if body.moves:
-        return body.mesh.vertices
-    pose = body.source.pose
-    return np.asarray(body.mesh.vertices @ pose.rotation.T + (pose.translation - anchor))
+def _rigid(vertices: FloatArray, world: World, faces: IntArray, link: int, backend: Backend) -> _Rigid:
+    used, triangles = _used(world.faces[faces])
+    points = vertices[used]
+    low, high = points.min(axis=0), points.max(axis=0)
+    radius = np.inf if link < 0 else float(np.linalg.norm(high - low)) / 2.0 + _SLACK_M
+    rows = np.append(faces, -1).astype(np.int32)
+    return _Rigid(RayCaster(points, triangles, backend), rows, (low + high) / 2.0, radius, link)
 
 
-def _compact(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+def _at_rest(world: World, anchor: FloatArray) -> FloatArray:
+    """Return the vertices of bodies that stand still, relative to the anchor; of those that move, as they are."""
+    placed = []
+    for body in world.bodies:
+        pose = body.source.pose
+        points = body.mesh.vertices
+        placed.append(points if body.moves else points @ pose.rotation.T + (pose.translation - anchor))
+    return np.concatenate(placed)
+
+
+def _towards(
+    rigid: _Rigid,
+    rotation: NDArray[np.float32],
+    shift: NDArray[np.float32],
+    d: NDArray[np.float32],
+    o: NDArray[np.float32] | None,
+) -> IntArray | None:
+    """Return the rays that pass the sphere about a rigid part; None stands for all."""
+    if not np.isfinite(rigid.radius):
+        return None
+    center = (rotation.T @ (rigid.center.astype(np.float32) - shift))[:, None]
+    if o is not None:
+        center = center - o
+    along = d[0] * center[0] + d[1] * center[1] + d[2] * center[2]
+    square = center[0] ** 2 + center[1] ** 2 + center[2] ** 2
+    near = np.float32(rigid.radius) ** 2
+    # the foot of the centre on the ray lies within the sphere, or its start does
+    return np.flatnonzero((square - along**2 <= near) & ((along > 0) | (square <= near))).astype(np.int64)
+
+
+def _columns(rows: NDArray[np.float32] | None, which: IntArray) -> NDArray[np.float32] | None:
+    return None if rows is None else rows[:, which]
+
+
+def _used(faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the vertices that faces use, and the faces in their numbers."""
     used, index = np.unique(faces, return_inverse=True)
-    return points[used], index.reshape(-1, 3).astype(np.int32)
+    return used, index.reshape(-1, 3).astype(np.int32)
 
 
 def _turned(rotation: NDArray[np.float32], rows: NDArray[np.float32]) -> NDArray[np.float32]:
