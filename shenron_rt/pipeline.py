@@ -23,7 +23,7 @@ from .tracing import trace
 if TYPE_CHECKING:
     from .echo.shenron import ShenronModel
 
-__all__ = ["Frame", "simulate", "simulate_all"]
+__all__ = ["Frame", "from_scatterers", "simulate", "simulate_all"]
 
 _log = logging.getLogger(__name__)
 
@@ -136,7 +136,9 @@ def simulate(
         if source.normal is None and model == "physical":  # metal is nothing but its mirror points
             source = source.with_normals()
         scatterers = lidar_scatterers(source, profile, mount, radar=name, seed=seed or 0, index=frame)
-        return _processed(scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy)
+        return from_scatterers(
+            scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy
+        )
     if not isinstance(source, Scene):
         raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}; a LidarFrame is taken too")
     place = source.radar(radar)
@@ -155,10 +157,10 @@ def simulate(
         max_bounces=max_bounces,
         backend=backend,
     )
-    return _processed(scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy)
+    return from_scatterers(scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy)
 
 
-def _processed(
+def from_scatterers(
     scatterers: Scatterers,
     used: RadarProfile,
     materials: str | os.PathLike[str],
@@ -168,7 +170,20 @@ def _processed(
     noise: str | None,
     accuracy: float,
 ) -> Frame:
-    """Run the chain from scatterers on; it is the same behind both doors."""
+    """Return the frame that scatterers give: the chain from there on is the same behind both doors.
+
+    Parameters
+    ----------
+    scatterers : Scatterers
+        Of one frame and radar; they carry its seed, number and name.
+    used : RadarProfile
+    materials : str or path
+        Material table of the scene.
+    time : float
+        Scene seconds at the first chirp's start [s].
+    model, noise, accuracy
+        As for :func:`simulate`.
+    """
     seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
     returns = illuminate(scatterers, used, model=model, materials=materials)
     if not returns.calibrated:

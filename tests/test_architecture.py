@@ -28,7 +28,7 @@ LAYERS = (
     ("synthesis",),
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),
-    ("turntable",),
+    ("turntable", "sequence"),
     ("runs", "run_frames"),
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page

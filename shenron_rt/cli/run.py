@@ -172,39 +172,38 @@ def _render(
 ) -> dict[str, Any]:
     """Write every frame of every radar and return the summary."""
     from .. import runs
-    from ..pipeline import simulate
     from ..scene.motion_of import check_times
+    from ..sequence import simulate_sequence
 
     wanted = frame_range(options.frames)
-    check_times(scene, (k * scene.frame_period_s + dt for k in (wanted[0], wanted[-1]) for dt in _mid_frames(scene)))
+    check_times(scene, (k * scene.frame_period_s + dt for k in wanted for dt in _mid_frames(scene)))
     names = scene.object_names()
     radars, backends = [], []
     with progress(len(wanted) * len(scene.radars), "rendering", quiet=quiet) as step:
         for mount in scene.radars:
             used = scene.profile_of(mount)
             records = []
-            for index in wanted:
-                step(f"{mount.name} frame {index}")
-                frame = simulate(
-                    scene,
-                    used,
-                    radar=mount.name,
-                    time=index * scene.frame_period_s,
-                    seed=scene.seed,
-                    frame=index,
-                    rays=options.rays,
-                    max_bounces=options.max_bounces,
-                    backend=options.backend,
-                    accuracy=options.accuracy,
-                    model=options.model,
-                )
-                folder = runs.frame_folder(root, mount.name, index)
+            step(f"{mount.name} frame {wanted.start}")
+            sequence = simulate_sequence(
+                scene,
+                used,
+                frames=wanted,
+                radar=mount.name,
+                seed=scene.seed,
+                rays=options.rays,
+                max_bounces=options.max_bounces,
+                backend=options.backend,
+                accuracy=options.accuracy,
+                model=options.model,
+            )
+            for frame in sequence:
+                folder = runs.frame_folder(root, mount.name, frame.frame)
                 runs.write_frame(folder, frame, keep)
                 if pictures:
-                    _draw(folder, scene, mount, used, frame, first=index == wanted.start)
+                    _draw(folder, scene, mount, used, frame, first=frame.frame == wanted.start)
                 records.append(runs.frame_summary(frame, names))
                 backends.append(frame.backend)
-                step(advance=1)
+                step(f"{mount.name} frame {frame.frame + 1}", advance=1)
             radars.append({"name": mount.name, "profile": used.name, "frames": records})
     return {
         "version": _version(),

@@ -173,11 +173,16 @@ class Ego(Moving):
 
 
 class RadarMount(Placed):
-    """A radar and its pose in the ego frame."""
+    """A radar and its pose in the ego frame.
+
+    ``blocked_below_deg`` is the elevation in the radar's frame below which the vehicle's own body, which is not part of
+    the scene, hides everything.
+    """
 
     name: str = "radar"
     profile: str | Path | RadarProfile = "awrl1432"
     xyz_m: Vector3 = DEFAULT_MOUNT_XYZ
+    blocked_below_deg: Annotated[float, Field(ge=-90, lt=90)] | None = None
 
     @field_validator("name")
     @classmethod

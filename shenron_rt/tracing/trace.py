@@ -97,6 +97,8 @@ def trace(
     launches = [_launch_pattern(profile, rays, run_seed, frame, mount.name), *aimed.values()]
     drawn = [pool().submit(launch.draw) for launch in launches]  # while the rays are under way
     parts, hits = _cast(world, caster, launches, list(aimed))
+    if mount.blocked_below_deg is not None:
+        hits = [_clear(launch.cells, h, mount.blocked_below_deg) for launch, h in zip(launches, hits, strict=True)]
     rows = [
         block
         for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
@@ -144,6 +146,11 @@ def _cast(
 @functools.lru_cache(maxsize=4)
 def _bodies_of(scene_key: _SceneKey) -> tuple[tuple[Body, ...], MaterialTable]:
     return load_bodies(scene_key.scene)
+
+
+def _clear(cells: Cells, hit: IntArray, below_deg: float) -> IntArray:
+    """Return the cells that do not look at the vehicle's own body."""
+    return hit[cells.directions_of(hit)[:, 2] >= np.sin(np.radians(below_deg))]
 
 
 class _SceneKey:

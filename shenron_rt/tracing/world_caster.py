@@ -57,10 +57,10 @@ class _Rigid:
 class WorldCaster:
     """Casts rays of a radar at a world; :meth:`place` makes it the next instant's.
 
-    What never moves keeps its place in the world, about a point near the start of the ego vehicle; each large rigid part
-    that moves keeps its own frame. Rays are taken there, so that neither vertices nor search trees are touched again.
-    Small parts that move, of which there may be thousands, are one mesh in the frame of the radar whose vertices move.
-    Which face is nearest where several are hit follows from their planes in float64.
+    What never moves keeps its place in the world, about a point near the start of the ego vehicle; each large rigid
+    part that moves keeps its own frame. Rays are taken there, so that neither vertices nor search trees are touched
+    again. Small parts that move, of which there may be thousands, are one mesh in the frame of the radar whose vertices
+    move. Which face is nearest where several are hit follows from their planes in float64.
 
     Parameters
     ----------

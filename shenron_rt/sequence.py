@@ -1,0 +1,89 @@
+"""Frames one after the other: the rays of the next are cast while the last is still in work."""
+
+from __future__ import annotations
+
+import functools
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+from .config.profile import RadarProfile
+from .config.scene import Scene
+from .pipeline import Frame, from_scatterers
+from .scene.motion_of import check_times
+from .tracing import trace
+
+if TYPE_CHECKING:
+    from .echo.shenron import ShenronModel
+
+__all__ = ["simulate_sequence"]
+
+#: Frames that are traced and not yet handed out; bounds memory.
+_AHEAD = 2
+
+
+def simulate_sequence(
+    scene: Scene,
+    profile: RadarProfile | None = None,
+    *,
+    frames: Iterable[int],
+    radar: str | None = None,
+    seed: int | None = None,
+    rays: int = 300_000,
+    max_bounces: int = 1,
+    model: str | ShenronModel = "physical",
+    noise: str | None = "thermal",
+    backend: str = "auto",
+    accuracy: float = 1e-5,
+) -> Iterator[Frame]:
+    """Render frames of one radar, ``scene.frame_period_s`` apart.
+
+    Parameters
+    ----------
+    scene : Scene
+    profile, radar, seed, rays, max_bounces, model, noise, backend, accuracy
+        As for :func:`shenron_rt.simulate`.
+    frames : iterable of int
+        Frame k begins at k times the scene's frame period.
+
+    Yields
+    ------
+    Frame
+        In the order of ``frames``; the same bytes as single calls of :func:`shenron_rt.simulate` give.
+
+    Raises
+    ------
+    InputError
+        Something of the scene has no pose at one of the frames, raised before the first; and what a frame raises.
+    """
+    mount = scene.radar(radar)
+    used = profile or scene.profile_of(mount)
+    numbers = list(frames)
+    check_times(scene, (k * scene.frame_period_s + used.frame_mid_s for k in numbers))
+    finish = functools.partial(from_scatterers, model=model, noise=noise, accuracy=accuracy)
+    waiting: deque[Future[Frame]] = deque()
+    with ThreadPoolExecutor(max_workers=1, thread_name_prefix="shenron-rt-frame") as worker:
+        try:
+            for k in numbers:
+                time = k * scene.frame_period_s
+                scatterers = trace(
+                    scene,
+                    used,
+                    radar=mount.name,
+                    time=time,
+                    seed=seed,
+                    frame=k,
+                    rays=rays,
+                    max_bounces=max_bounces,
+                    backend=backend,
+                )
+                work = functools.partial(finish, scatterers, used, scene.materials, time=time)
+                waiting.append(worker.submit(work))
+                if len(waiting) == _AHEAD:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
