@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 import logging
 import os
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from .config.profile import RadarProfile
 from .config.scene import Scene
@@ -15,9 +16,11 @@ from .errors import InputError
 from .frames import Pose
 from .lidar.door import lidar_scatterers
 from .lidar.frame import LidarFrame
+from .retrace import segments
 from .returns import Returns, illuminate
 from .scatterers import Scatterers
 from .synthesis import AdcCube, synthesize
+from .synthesis.synthesize import synthesize_segments
 from .tracing import trace
 
 if TYPE_CHECKING:
@@ -26,6 +29,14 @@ if TYPE_CHECKING:
 __all__ = ["Frame", "from_scatterers", "simulate", "simulate_all"]
 
 _log = logging.getLogger(__name__)
+
+
+class _Synthesis(TypedDict):
+    noise: str | None
+    seed: int
+    frame: int
+    accuracy: float
+    radar: str
 
 
 @dataclass(frozen=True)
@@ -83,6 +94,7 @@ def simulate(
     mount: Pose | None = None,
     backend: str = "auto",
     accuracy: float = 1e-5,
+    retrace: int = 1,
 ) -> Frame:
     """Render one frame of one radar.
 
@@ -111,6 +123,9 @@ def simulate(
         Replaces the radar's pose in the ego frame. With a LiDAR frame: default (2, 0, 1) m; needs its ``sensor_pose``.
     accuracy : float
         Of the ADC synthesis, relative to the RMS of the noise-free cube.
+    retrace : int
+        Segments of the frame at whose middles the scene is traced again, up to the number of loops; 1 is mid-frame
+        only, from where everything moves in straight lines. A LiDAR frame has one instant only.
 
     Returns
     -------
@@ -146,18 +161,18 @@ def simulate(
         place = place.model_copy(update={"xyz_m": mount.xyz, "ypr_deg": mount.ypr_deg})
         source = source.model_copy(update={"radars": (place,)})
     used = profile or source.profile_of(place)
-    scatterers = trace(
-        source,
-        used,
-        radar=place.name,
-        time=time,
-        seed=seed,
-        frame=frame,
-        rays=rays,
-        max_bounces=max_bounces,
-        backend=backend,
+    look = functools.partial(
+        trace, source, radar=place.name, seed=seed, frame=frame, rays=rays, max_bounces=max_bounces, backend=backend
     )
-    return from_scatterers(scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy)
+    finish = functools.partial(from_scatterers, model=model, noise=noise, accuracy=accuracy, time=time)
+    if retrace == 1:
+        return finish(look(used, time=time), used, source.materials)
+    light = functools.partial(illuminate, model=model, materials=source.materials)
+
+    def several(returns: Returns) -> Iterator[tuple[RadarProfile, Returns]]:
+        return segments(used, returns, retrace, lambda part, start: look(part, time=time + start), light)
+
+    return finish(look(used, time=time), used, source.materials, segments_of=several)
 
 
 def from_scatterers(
@@ -169,6 +184,7 @@ def from_scatterers(
     model: str | ShenronModel,
     noise: str | None,
     accuracy: float,
+    segments_of: Callable[[Returns], Iterable[tuple[RadarProfile, Returns]]] | None = None,
 ) -> Frame:
     """Return the frame that scatterers give: the chain from there on is the same behind both doors.
 
@@ -183,6 +199,8 @@ def from_scatterers(
         Scene seconds at the first chirp's start [s].
     model, noise, accuracy
         As for :func:`simulate`.
+    segments_of : callable, optional
+        Gives the echoes of parts of the frame from those of mid-frame; see :mod:`shenron_rt.retrace`.
     """
     seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
     returns = illuminate(scatterers, used, model=model, materials=materials)
@@ -191,7 +209,11 @@ def from_scatterers(
             "echo model %s gives the counts of the released code, not watts: levels in dBm, SNR and RCS mean nothing",
             returns.model,
         )
-    adc = synthesize(returns, used, noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
+    options = _Synthesis(noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
+    if segments_of is None:
+        adc = synthesize(returns, used, **options)
+    else:
+        adc = synthesize_segments(segments_of(returns), used, returns, **options)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
     detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)

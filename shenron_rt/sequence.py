@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .config.profile import RadarProfile
 from .config.scene import Scene
-from .pipeline import Frame, from_scatterers
+from .pipeline import Frame, from_scatterers, simulate
 from .scene.motion_of import check_times
 from .tracing import trace
 
@@ -36,13 +36,14 @@ def simulate_sequence(
     noise: str | None = "thermal",
     backend: str = "auto",
     accuracy: float = 1e-5,
+    retrace: int = 1,
 ) -> Iterator[Frame]:
     """Render frames of one radar, ``scene.frame_period_s`` apart.
 
     Parameters
     ----------
     scene : Scene
-    profile, radar, seed, rays, max_bounces, model, noise, backend, accuracy
+    profile, radar, seed, rays, max_bounces, model, noise, backend, accuracy, retrace
         As for :func:`shenron_rt.simulate`.
     frames : iterable of int
         Frame k begins at k times the scene's frame period.
@@ -61,6 +62,24 @@ def simulate_sequence(
     used = profile or scene.profile_of(mount)
     numbers = list(frames)
     check_times(scene, (k * scene.frame_period_s + used.frame_mid_s for k in numbers))
+    if retrace != 1:  # its rays are cast while its echoes are summed
+        for k in numbers:
+            yield simulate(
+                scene,
+                used,
+                radar=mount.name,
+                time=k * scene.frame_period_s,
+                seed=seed,
+                frame=k,
+                rays=rays,
+                max_bounces=max_bounces,
+                model=model,
+                noise=noise,
+                backend=backend,
+                accuracy=accuracy,
+                retrace=retrace,
+            )
+        return
     finish = functools.partial(from_scatterers, model=model, noise=noise, accuracy=accuracy)
     waiting: deque[Future[Frame]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="shenron-rt-frame") as worker:

@@ -25,6 +25,7 @@ LAYERS = (
     ("sbr",),
     ("tracing",),
     ("returns", "echo"),
+    ("retrace",),
     ("synthesis",),
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),

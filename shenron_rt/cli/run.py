@@ -53,6 +53,7 @@ def run(
     model: str | None = None,
     pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
     write: str | None = None,
+    retrace: int | None = None,
     json_: Json = False,
 ) -> int:
     """Render a scene: scatterers, ADC cube, maps, detections and pictures of every radar.
@@ -78,6 +79,8 @@ def run(
     write
         What to keep of every frame, with commas: scatterers, returns, adc, cube, maps (a part of cube), detections.
         Default: all of it.
+    retrace
+        Trace so many instants of every frame, for what turns fast. Default: 1, mid-frame.
     """
     from .. import runs
     from ..config.scene import load_scene
@@ -87,7 +90,7 @@ def run(
     loaded = load_scene(scene, overrides.scene)
     given = {
         "frames": frames, "rays": rays, "max_bounces": max_bounces, "backend": backend, "accuracy": accuracy,
-        "model": model,
+        "model": model, "retrace": retrace,
     }  # fmt: skip
     options, keep = _options(loaded.run, given), parts_of(write)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
@@ -118,6 +121,7 @@ class _Options:
     backend: str = "auto"
     accuracy: float = 1e-5
     model: str = "physical"
+    retrace: int = 1
 
     def record(self) -> dict[str, Any]:
         return asdict(self)
@@ -195,6 +199,7 @@ def _render(
                 backend=options.backend,
                 accuracy=options.accuracy,
                 model=options.model,
+                retrace=options.retrace,
             )
             for frame in sequence:
                 folder = runs.frame_folder(root, mount.name, frame.frame)

@@ -156,11 +156,12 @@ class Actor(Moving, MeshSource):
 
 
 class PointTarget(ConfigModel):
-    """A point with a given RCS."""
+    """A point with a given RCS; of an ``actor`` it is fixed to, ``xyz_m`` and ``velocity_mps`` are in its frame."""
 
     id: ActorId
     xyz_m: Vector3
     velocity_mps: Vector3 = ZERO
+    actor: ActorId | None = None
     rcs_dbsm: float
     tag: str = "Other"
     name: str = ""
@@ -252,6 +253,14 @@ class Scene(ConfigModel):
             twice = sorted({v for v in values if values.count(v) > 1})
             if twice:
                 raise ValueError(f"{label} {twice[0]} is given to more than one thing")
+        return self
+
+    @model_validator(mode="after")
+    def _points_have_their_actors(self) -> Self:
+        known = [a.id for a in self.actors]
+        for point in self.point_targets:
+            if point.actor is not None and point.actor not in known:
+                raise ValueError(f"point target {point.id}: no actor {point.actor}; the scene's actors: {known}")
         return self
 
     def radar(self, name: str | None = None) -> RadarMount:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..config.scene import Actor, Ego, Moving, Scene
+from ..config.scene import Actor, Ego, Moving, PointTarget, Scene
 from ..errors import ConfigError, InputError
 from ..frames import Pose, from_carla_pose
 from .motion import BodyState, body_state
@@ -19,7 +19,7 @@ from .trajectory import Trajectory
 if TYPE_CHECKING:
     from ..config._base import Placed
 
-__all__ = ["check_times", "ego_state", "state_of", "trajectory_of"]
+__all__ = ["check_times", "ego_state", "point_state", "state_of", "trajectory_of"]
 
 
 def state_of(item: Placed, folder: Path, time: float) -> BodyState:
@@ -50,6 +50,15 @@ def state_of(item: Placed, folder: Path, time: float) -> BodyState:
 def ego_state(scene: Scene, time: float) -> BodyState:
     """Return the ego vehicle's state in the world."""
     return state_of(scene.ego, scene.folder, time)
+
+
+def point_state(scene: Scene, target: PointTarget, time: float) -> BodyState:
+    """Return the state of a point target in the world, its own motion in the frame of the actor it is fixed to."""
+    own = body_state(Pose(target.xyz_m), target.velocity_mps, 0.0, time)
+    if target.actor is None:
+        return own
+    carrier = next(a for a in scene.actors if a.id == target.actor)
+    return state_of(carrier, scene.folder, time).carrying(own)
 
 
 def check_times(scene: Scene, times: Iterable[float]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from .nufft import nufft_field
 from .receiver import add_noise, cube_noise_power, quantise, to_adc
 from .signal import Points, decode, hadamard, transmitted
 
-__all__ = ["synthesize"]
+__all__ = ["synthesize", "synthesize_segments"]
 
 ACCURACY_MIN, ACCURACY_MAX = 1e-9, 1e-1
 #: Finest accuracy double precision allows at 1e5 cycles of carrier phase.
@@ -76,9 +77,66 @@ def synthesize(
     tau = (abs(p - tx) + abs(p - rx)) / c at the instant of the sample, p = position + velocity (T - mid-frame).
     """
     _check(profile, noise, accuracy, method)
-    seed = 0 if seed is None else int(seed)
+    clean = _clean(profile, returns, accuracy, method)
+    return _received(profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar)
+
+
+def synthesize_segments(
+    segments: Iterable[tuple[RadarProfile, Returns]],
+    profile: RadarProfile,
+    returns: Returns,
+    *,
+    noise: str | None = "thermal",
+    seed: int | None = None,
+    frame: int = 0,
+    accuracy: float = 1e-5,
+    method: str = "nufft",
+    radar: str = "",
+) -> AdcCube:
+    """Synthesise the ADC samples of a frame whose echoes are known at several instants.
+
+    Parameters
+    ----------
+    segments : iterable of (RadarProfile, Returns)
+        Consecutive loops of the frame as frames of their own, and the echoes at the middle of each.
+    profile : RadarProfile
+        Of the whole frame.
+    returns : Returns
+        At mid-frame, for the truth that the cube carries.
+    noise, seed, frame, accuracy, method, radar
+        As for :func:`synthesize`; noise and receiver are those of the whole frame.
+
+    Raises
+    ------
+    InputError
+        As :func:`synthesize`, or segments that are not the frame's loops.
+    """
+    _check(profile, noise, accuracy, method)
+    clean = np.concatenate([_clean(part, echoes, accuracy, method) for part, echoes in segments])
+    if len(clean) != profile.waveform.chirps:
+        raise InputError(
+            f"segments of {len(clean)} loops in all; the frame of {profile.name!r} has {profile.waveform.chirps}"
+        )
+    return _received(profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar)
+
+
+def _clean(profile: RadarProfile, returns: Returns, accuracy: float, method: str) -> ComplexArray:
     points = Points.from_returns(returns)
-    clean = transmitted(profile, points, direct_field) if method == "direct" else _fast(profile, points, accuracy)
+    return transmitted(profile, points, direct_field) if method == "direct" else _fast(profile, points, accuracy)
+
+
+def _received(
+    profile: RadarProfile,
+    clean: ComplexArray,
+    returns: Returns,
+    *,
+    noise: str | None,
+    seed: int | None,
+    frame: int,
+    radar: str,
+) -> AdcCube:
+    """Return what the receiver makes of the noise-free chirps."""
+    seed = 0 if seed is None else int(seed)
     raw = to_adc(profile, clean)
     if noise is not None:
         add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))

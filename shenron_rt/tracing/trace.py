@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..config.scene import Scene
 from ..errors import InputError
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
-from ..scene.motion import BodyState
+from ..scene.motion_of import point_state
 from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
@@ -276,7 +277,8 @@ def _rows(world: World, cells: Cells, face: IntArray, cell: IntArray) -> Columns
 def _point_rows(scene: Scene, world: World, caster: WorldCaster, time: float) -> Columns:
     """Return the columns of the point targets nothing stands before."""
     targets, eye = scene.point_targets, world.radar_state
-    where = np.array([np.add(t.xyz_m, np.multiply(t.velocity_mps, time)) for t in targets]).reshape(-1, 3)
+    states = [point_state(scene, target, time) for target in targets]
+    where = np.array([state.origin for state in states]).reshape(-1, 3)
     position = (where - eye.origin) @ eye.rotation
     distance = np.linalg.norm(position, axis=1)
     d = position / np.maximum(distance, 1e-12)[:, None]
@@ -285,7 +287,7 @@ def _point_rows(scene: Scene, world: World, caster: WorldCaster, time: float) ->
     ahead = np.abs(world.face_offset[face]) if world.face_normal.size else np.full(len(d), np.inf)
     hidden = (face >= 0) & (ahead < (distance - _POINT_SLACK_M) * along)
     seen = np.flatnonzero(~hidden & (distance > 0))
-    motion = [relative_motion(_point_state(w, t.velocity_mps), eye) for w, t in zip(where, targets, strict=True)]
+    motion = [relative_motion(replace(state, spin=np.zeros(3)), eye) for state in states]
     velocity = np.array([drift + np.cross(turn, p) for (drift, turn), p in zip(motion, position, strict=True)])
     velocity = velocity.reshape(-1, 3)[seen]
     n = len(seen)
@@ -308,8 +310,3 @@ def _point_rows(scene: Scene, world: World, caster: WorldCaster, time: float) ->
         "rcs": np.array([10 ** (t.rcs_dbsm / 10) for t in targets], dtype=np.float64)[seen],
         "bounces": np.ones(n, dtype=np.uint8),
     }
-
-
-def _point_state(where: FloatArray, velocity: tuple[float, ...]) -> BodyState:
-    """Return the state of a point that does not turn."""
-    return BodyState(np.eye(3), where, np.asarray(velocity, dtype=np.float64), np.zeros(3))

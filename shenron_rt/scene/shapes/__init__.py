@@ -46,8 +46,8 @@ def wheels_of(name: str) -> tuple[Wheel, ...]:
 def make_jointed(text: str) -> tuple[TaggedMesh, float]:
     """Return a ready-made shape in pieces that can move by themselves, and its height [m].
 
-    The pedestrian stands straight and is cut at hips, knees, shoulders and elbows; the bicycle has a piece for each rim
-    and tyre; all others are as they are.
+    The pedestrian stands straight and is cut at hips, knees, shoulders and elbows; the bicycle has a piece for each
+    rim and tyre; all others are as they are.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def make_jointed(text: str) -> tuple[TaggedMesh, float]:
     """
     name, parameters = parse(text, SHAPES)
     if name == "pedestrian":
-        mesh = _assemble(name, str(text).strip(), people.walker(float(parameters["h"])))
+        height = float(parameters.get("h", SHAPES[name].optional["h"]))
+        mesh = _assemble(name, str(text).strip(), people.walker(height))
     else:
         mesh = _assemble(name, text, ridden()) if name == "bicycle" else make_shape(text)
     return mesh, float(mesh.bounds[1, 2])
