@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -100,4 +101,5 @@ def _joined(a: Returns, b: Returns) -> Returns:
     """Return the echoes of both; where only one tells departure from arrival, the other says they are the same."""
     if (a.departure is None) != (b.departure is None):
         a, b = (r if r.departure is not None else replace(r, departure=r.position) for r in (a, b))
-    return replace(a, **{name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _columns(a)})
+    both: dict[str, Any] = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _columns(a)}
+    return replace(a, **both)

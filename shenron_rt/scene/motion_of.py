@@ -54,7 +54,8 @@ def ego_state(scene: Scene, time: float) -> BodyState:
 
 def point_state(scene: Scene, target: PointTarget, time: float) -> BodyState:
     """Return the state of a point target in the world, its own motion in the frame of the actor it is fixed to."""
-    own = body_state(Pose(target.xyz_m), target.velocity_mps, 0.0, time)
+    x, y, z = target.xyz_m
+    own = body_state(Pose((x, y, z)), target.velocity_mps, 0.0, time)
     if target.actor is None:
         return own
     carrier = next(a for a in scene.actors if a.id == target.actor)

@@ -214,7 +214,7 @@ def _moved(rows: FloatArray, rotation: FloatArray, link: IntArray) -> FloatArray
     """Return (n, 3) rows turned by the rotation of their link."""
     if len(rotation) == 1:
         return np.asarray(rows @ rotation[0].T)
-    return np.einsum("nij,nj->ni", rotation[link], rows)
+    return np.asarray(np.einsum("nij,nj->ni", rotation[link], rows))
 
 
 def _stack(items: list[NDArray[Any]], empty: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:

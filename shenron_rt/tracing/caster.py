@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -100,6 +101,7 @@ class RayCaster:
 
     def _one_by_one(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> IntArray:
         cast, Ray, Point = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f
+        starts: Iterable[Any]
         if o is None or o.shape[1] == 1:
             start = Point(0, 0, 0) if o is None else Point(o[:, 0].tolist())
             starts, together = itertools.repeat(start), True

@@ -151,7 +151,8 @@ def _bodies_of(scene_key: _SceneKey) -> tuple[tuple[Body, ...], MaterialTable]:
 
 def _clear(cells: Cells, hit: IntArray, below_deg: float) -> IntArray:
     """Return the cells that do not look at the vehicle's own body."""
-    return hit[cells.directions_of(hit)[:, 2] >= np.sin(np.radians(below_deg))]
+    keep = cells.directions_of(hit)[:, 2] >= np.sin(np.radians(below_deg))
+    return np.asarray(hit[keep])
 
 
 class _SceneKey:
