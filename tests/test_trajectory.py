@@ -319,3 +319,12 @@ def test_scene_with_a_trajectory_survives_its_own_config(tmp_path):
     for t in (0.0, 0.3, 1.7):
         for a, b in ((scene.ego, again.ego), (scene.actors[0], again.actors[0])):
             np.testing.assert_array_equal(state_of(a, None, t).velocity, state_of(b, None, t).velocity)
+
+
+def test_validate_finds_a_recording_that_cannot_be_replayed(tmp_path, capsys):
+    from shenron_rt.cli import main
+
+    write_csv(tmp_path / "drive.csv", ROWS[::-1])
+    (tmp_path / "s.yaml").write_text("version: 1\nego: {trajectory_file: drive.csv, trajectory_frame: ros}\n")
+    assert main(["validate", str(tmp_path / "s.yaml")]) == 2
+    assert "sort them by time" in capsys.readouterr().err

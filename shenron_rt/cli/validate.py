@@ -192,14 +192,18 @@ def _manifest(path: Path) -> str:
 
 
 def _scene(path: Path) -> str:
-    """Load a scene with its profiles, meshes, tags and materials."""
+    """Load a scene with its profiles, meshes, tags, materials and recorded trajectories."""
     from ..config.scene import load_scene
+    from ..scene.motion_of import trajectory_of
     from ..scene.world import load_bodies
 
     scene = load_scene(path)
     profiles = [scene.profile_of(r).name for r in scene.radars]
     bodies, _ = load_bodies(scene)
     triangles = sum(b.mesh.n_faces for b in bodies)
+    for mover in (scene.ego, *scene.actors):
+        if mover.has_trajectory:
+            trajectory_of(mover, scene.folder)
     return (
         f"{len(scene.static)} static parts, {len(scene.actors)} actors, {len(scene.point_targets)} point targets, "
         f"{triangles} triangles, radars {', '.join(profiles)}"
