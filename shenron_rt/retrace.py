@@ -82,7 +82,9 @@ def _loops(profile: RadarProfile, first: int, last: int) -> RadarProfile:
 
 
 def _rows(returns: Returns, keep: BoolArray) -> Returns:
-    return replace(returns, **{name: getattr(returns, name)[keep] for name in _columns(returns)})
+    # the chains of objects are told of mid-frame's echoes; samples need none
+    kept: dict[str, Any] = {name: getattr(returns, name)[keep] for name in _columns(returns)}
+    return replace(returns, chains=None, **kept)
 
 
 def _columns(returns: Returns) -> list[str]:
@@ -93,13 +95,19 @@ def _columns(returns: Returns) -> list[str]:
 
 def _ahead(returns: Returns, seconds: float) -> Returns:
     shift = returns.velocity * seconds
-    departure = None if returns.departure is None else returns.departure + shift
+    if returns.departure is None:
+        return replace(returns, position=returns.position + shift)
+    leaving = returns.velocity if returns.departure_velocity is None else returns.departure_velocity
+    departure = returns.departure + leaving * seconds
     return replace(returns, position=returns.position + shift, departure=departure)
 
 
 def _joined(a: Returns, b: Returns) -> Returns:
     """Return the echoes of both; where only one tells departure from arrival, the other says they are the same."""
     if (a.departure is None) != (b.departure is None):
-        a, b = (r if r.departure is not None else replace(r, departure=r.position) for r in (a, b))
+        a, b = (
+            r if r.departure is not None else replace(r, departure=r.position, departure_velocity=r.velocity)
+            for r in (a, b)
+        )
     both: dict[str, Any] = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _columns(a)}
     return replace(a, **both)

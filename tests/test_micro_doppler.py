@@ -277,3 +277,15 @@ def test_unknown_spinning_part_lists_the_parts():
     scene = rolling(spinning_parts=[{"part": "rotor", "center_m": (0, 0, 1), "rate_deg_s": 90}])
     with pytest.raises(ValueError, match=r"no part is named 'rotor'; the mesh has: .*front left tyre"):
         load_bodies(scene)
+
+
+def test_retracing_takes_paths_over_several_surfaces_along():
+    scene = srt.Scene(
+        static=[{"shape": "ground:40x20", "xyz_m": (21, 0, 0), "tag": "Roads", "material": "asphalt"}],
+        actors=[{"id": 5, "shape": "box:2x1.8x1.5", "xyz_m": (20, 1, 0.75), "velocity_mps": (7, 0, 0), "aim": 2000}],
+        radars=[RADAR],
+    )
+    frames = [srt.simulate(scene, profile(), rays=2000, max_bounces=2, noise=None, seed=2, retrace=n) for n in (1, 2)]
+    assert np.any(frames[0].returns.bounces > 1)
+    power = [np.sum(np.abs(f.adc.data) ** 2) for f in frames]
+    assert 10 * np.log10(power[1] / power[0]) == pytest.approx(0.0, abs=0.5)
