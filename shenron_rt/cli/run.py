@@ -124,12 +124,13 @@ class _Options:
     retrace: int = 1
 
     def record(self) -> dict[str, Any]:
-        return asdict(self)
+        """Return what the config keeps; ``retrace`` only where it is asked for, as older versions do not know it."""
+        return {k: v for k, v in asdict(self).items() if k != "retrace" or v != 1}
 
 
 def _options(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> _Options:
     """Merge the options of an earlier run's config with those given now."""
-    known = _Options().record()
+    known = asdict(_Options())
     unknown = sorted(set(earlier) - set(known))
     if unknown:
         raise InputError(f"run: unknown option {unknown[0]!r} in the config; known: {', '.join(known)}")
