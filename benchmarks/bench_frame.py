@@ -2,8 +2,8 @@
 
     python benchmarks/bench_frame.py
 
-Twice: frames of one instant (the placed scene is kept), and frames that follow each other at 10 Hz (actors move, the
-scene is placed and its search tree built again for every one).
+Twice: frames of one instant (the placed scene is kept), and frames that follow each other at 10 Hz (actors move and the
+scene is placed for every one; the search trees are kept).
 """
 
 from __future__ import annotations

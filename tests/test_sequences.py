@@ -67,7 +67,7 @@ def test_car_ahead_is_detected_throughout(name):
 @pytest.mark.slow
 def test_turning_car_is_detected_throughout():
     missed = [k for k, _, table in drive("turning") if 101 not in table["object_id"]]
-    assert len(missed) <= 4, missed
+    assert len(missed) <= 1, missed
 
 
 @pytest.mark.slow
@@ -82,7 +82,7 @@ def test_buildings_near_boresight_fold_all_along_the_motorway():
         found += len(folded) > 0
         assert np.all(folded["ambiguous"]), k
         assert np.all(folded["velocity"] < 26.8), k
-    assert found >= FRAMES - 3
+    assert found >= FRAMES - 1
 
 
 @pytest.mark.slow

@@ -237,9 +237,10 @@ def _version() -> str:
 def _draw(folder: Path, scene: Scene, mount: RadarMount, used: RadarProfile, frame: Frame, *, first: bool) -> None:
     from ..plot import antenna_cuts, write_pictures
     from ..plot._style import save
-    from ..scene.world import build_world, load_bodies
+    from ..scene.world import build_world
+    from ..tracing.trace import bodies_of
 
-    bodies, table = load_bodies(scene)
+    bodies, table = bodies_of(scene)
     world = build_world(scene, mount, frame.time + used.frame_mid_s, bodies, table)
     title = f"{scene.name}, {mount.name} ({used.name}), frame {frame.frame}"
     write_pictures(folder, frame, names=scene.object_names(), mesh=(world.vertices, world.faces), title=title)

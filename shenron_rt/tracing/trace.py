@@ -144,6 +144,11 @@ def _cast(
     return parts, hits
 
 
+def bodies_of(scene: Scene) -> tuple[tuple[Body, ...], MaterialTable]:
+    """Return the bodies of a scene, kept from the last frames."""
+    return _bodies_of(_SceneKey(scene))
+
+
 @functools.lru_cache(maxsize=4)
 def _bodies_of(scene_key: _SceneKey) -> tuple[tuple[Body, ...], MaterialTable]:
     return load_bodies(scene_key.scene)
@@ -177,7 +182,7 @@ def _prepared(scene: Scene, mount: Placed, time: float, backend: Backend) -> tup
     before = _last.get("world")
     if before is not None and before[0] == key:
         return before[1:]
-    bodies, materials = _bodies_of(_SceneKey(scene))
+    bodies, materials = bodies_of(scene)
     world = build_world(scene, mount, time, bodies, materials)
     caster = _casters.get(scene_key)
     if caster is None:
