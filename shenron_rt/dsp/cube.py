@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -52,6 +52,11 @@ class RadarCube:
         Whose attenuation the echoes had.
     returns : Returns or None
         The echoes behind it, for truth attribution; not saved.
+    mid_offset_s : float
+        Middle of the chirps behind it after mid-frame; 0 but for a burst of a frame [s].
+    bursts : tuple of RadarCube
+        Of a profile with ``stagger: burst``: the cube of each burst, with Doppler bins of its own chirp interval. Those
+        are detected on; the cube itself sums the whole frame, with half the level at the folds of either interval.
     """
 
     data: ComplexArray
@@ -62,6 +67,8 @@ class RadarCube:
     noise_added: bool = True
     weather: Weather | None = None
     returns: Returns | None = field(default=None, repr=False)
+    mid_offset_s: float = 0.0
+    bursts: tuple[RadarCube, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if not all(self.n_fft):
@@ -163,6 +170,9 @@ class RadarCube:
         names = ["data", "range_m", "velocity_mps", "azimuth_rad", "range_doppler", "range_azimuth"]
         names += ["range_window", "doppler_window", "n_fft", "noise_added", "noise_power_w"]
         arrays: dict[str, Any] = {name: getattr(self, name) for name in names}
+        if self.bursts:
+            arrays["bursts"] = np.stack([cube.data for cube in self.bursts])
+            arrays["burst_mid_offset_s"] = [cube.mid_offset_s for cube in self.bursts]
         weather = None if self.weather is None else self.weather.to_array()
         save_npz(path, arrays | {"profile": self.profile.model_dump_json(), "weather": weather})
 
@@ -177,7 +187,7 @@ class RadarCube:
         from ..config.profile import RadarProfile
 
         arrays = load_npz(path, ("data", "profile", "range_window", "doppler_window", "n_fft"))
-        return cls(
+        whole = cls(
             data=arrays["data"].astype(np.complex128),
             profile=RadarProfile.model_validate(json.loads(str(arrays["profile"]))),
             range_window=str(arrays["range_window"]),
@@ -186,6 +196,15 @@ class RadarCube:
             noise_added=bool(arrays.get("noise_added", True)),
             weather=Weather.from_array(arrays["weather"]) if "weather" in arrays else None,
         )
+        if "bursts" not in arrays:
+            return whole
+        parts = zip(arrays["bursts"], whole.profile.bursts, arrays["burst_mid_offset_s"], strict=True)
+        n_fft = (whole.n_fft[0], arrays["bursts"].shape[2])
+        cubes = (
+            replace(whole, data=data.astype(np.complex128), profile=profile, n_fft=n_fft, mid_offset_s=float(offset))
+            for data, profile, offset in parts
+        )
+        return replace(whole, bursts=tuple(cubes))
 
 
 def bartlett_max(snapshots: ComplexArray, vectors: ComplexArray) -> FloatArray:
@@ -225,6 +244,7 @@ def process(
     Returns
     -------
     RadarCube
+        Of a profile with ``stagger: burst`` that of the whole frame, with one of each burst in ``bursts``.
 
     Raises
     ------
@@ -258,4 +278,16 @@ def process(
         noise_added=adc.noise_power_w > 0,
         weather=adc.weather,
         returns=adc.returns,
+        mid_offset_s=adc.mid_offset_s,
+        bursts=_bursts(adc, range_window, doppler_window, lengths),
+    )
+
+
+def _bursts(adc: AdcCube, range_window: str, doppler_window: str, n_fft: tuple[int, int]) -> tuple[RadarCube, ...]:
+    """Return the cubes of the bursts of a frame that has several, each with its share of the Doppler bins."""
+    if len(adc.bursts) == 1:
+        return ()
+    lengths = (n_fft[0], -(-n_fft[1] // len(adc.bursts)))
+    return tuple(
+        process(burst, range_window=range_window, doppler_window=doppler_window, n_fft=lengths) for burst in adc.bursts
     )
