@@ -83,6 +83,7 @@ def simulate(
     mount: Pose | None = None,
     backend: str = "auto",
     accuracy: float = 1e-5,
+    previous: Frame | None = None,
 ) -> Frame:
     """Render one frame of one radar.
 
@@ -111,6 +112,8 @@ def simulate(
         Replaces the radar's pose in the ego frame. With a LiDAR frame: default (2, 0, 1) m; needs its ``sensor_pose``.
     accuracy : float
         Of the ADC synthesis, relative to the RMS of the noise-free cube.
+    previous : Frame, optional
+        An earlier frame of the same radar, from which ``processing.ambiguity: two_frame`` unfolds velocities.
 
     Returns
     -------
@@ -136,7 +139,9 @@ def simulate(
         if source.normal is None and model == "physical":  # metal is nothing but its mirror points
             source = source.with_normals()
         scatterers = lidar_scatterers(source, profile, mount, radar=name, seed=seed or 0, index=frame)
-        return _processed(scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy)
+        return _processed(
+            scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy, previous=previous
+        )
     if not isinstance(source, Scene):
         raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}; a LidarFrame is taken too")
     place = source.radar(radar)
@@ -155,7 +160,9 @@ def simulate(
         max_bounces=max_bounces,
         backend=backend,
     )
-    return _processed(scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy)
+    return _processed(
+        scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy, previous=previous
+    )
 
 
 def _processed(
@@ -167,6 +174,7 @@ def _processed(
     model: str | ShenronModel,
     noise: str | None,
     accuracy: float,
+    previous: Frame | None,
 ) -> Frame:
     """Run the chain from scatterers on; it is the same behind both doors."""
     seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
@@ -179,7 +187,14 @@ def _processed(
     adc = synthesize(returns, used, noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
-    detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
+    detections = detect(
+        cube,
+        pfa=settings.pfa,
+        blanking_m=settings.blanking_m,
+        ambiguity=settings.ambiguity,
+        previous=None if previous is None else previous.detections,
+        interval_s=None if previous is None else time - previous.time,
+    )
     return Frame(
         scatterers=scatterers,
         returns=returns,

@@ -173,7 +173,7 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
     with progress(len(wanted) * len(scene.radars), "rendering", quiet=quiet) as step:
         for mount in scene.radars:
             used = scene.profile_of(mount)
-            records = []
+            records, last = [], None
             for index in wanted:
                 step(f"{mount.name} frame {index}")
                 frame = simulate(
@@ -188,7 +188,9 @@ def _render(scene: Scene, options: _Options, root: Path, *, pictures: bool, quie
                     backend=options.backend,
                     accuracy=options.accuracy,
                     model=options.model,
+                    previous=last,
                 )
+                last = frame
                 folder = runs.frame_folder(root, mount.name, index)
                 runs.write_frame(folder, frame)
                 if pictures:
