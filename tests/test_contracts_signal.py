@@ -17,8 +17,8 @@ from shenron_rt.physics import near_range_plate_rcs
 from shenron_rt.scatterers import Scatterers
 
 PROFILES = [
-    "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "mmwcas", "radarbook", "radarbook2",
-    "ti_cascade",
+    "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "mmwcas", "radarbook",
+    "radarbook2", "ti_cascade",
 ]  # fmt: skip
 
 

@@ -87,6 +87,20 @@ class RadarProfile(ConfigModel):
     processing: Processing = Processing()
     sources: Mapping[str, str] = {}
 
+    @model_validator(mode="after")
+    def _sub_bands_hold_whole_bins(self) -> Self:
+        if self.array.multiplex != "ddm":
+            return self
+        w, loops = self.waveform, self.waveform.chirps // self.waveform.n_bursts
+        if loops % self.n_subbands:
+            raise ValueError(
+                f"multiplex ddm: {loops} chirps do not fill {self.n_subbands} sub-bands ({self.n_tx} transmitters + "
+                f"{self.array.empty_subbands} empty) evenly; take a multiple of {self.n_subbands}"
+            )
+        if len(w.periods_s) > w.n_bursts:
+            raise ValueError("multiplex ddm: one chirp_period_s is needed, or one for each burst (stagger: burst)")
+        return self
+
     # ---- waveform
     @property
     def slope_hz_per_s(self) -> float:
@@ -121,7 +135,12 @@ class RadarProfile(ConfigModel):
     @property
     def n_chirps_per_loop(self) -> int:
         """Chirps in one loop: n_tx under TDM and BPM, else 1."""
-        return 1 if self.array.multiplex == "simultaneous" else self.n_tx
+        return self.n_tx if self.array.multiplex in ("tdm", "bpm") else 1
+
+    @property
+    def n_subbands(self) -> int:
+        """Parts of the Doppler spectrum between which DDM shifts the transmitters, empty ones included; else 1."""
+        return self.n_tx + self.array.empty_subbands if self.array.multiplex == "ddm" else 1
 
     @cached_property
     def raw_chirp_start_s(self) -> FloatArray:
@@ -196,7 +215,7 @@ class RadarProfile(ConfigModel):
     @property
     def n_tx(self) -> int:
         """Transmitters."""
-        return len(self.tx_m)
+        return len(self.array.tx_m or self.array.tx or (0,))
 
     @property
     def n_rx(self) -> int:

@@ -82,15 +82,17 @@ class Array(ConfigModel):
 
     Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at
     z = r. ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
+    ``empty_subbands`` of the Doppler spectrum carry no transmitter under DDM.
     """
 
-    multiplex: Literal["simultaneous", "tdm", "bpm"] = "simultaneous"
+    multiplex: Literal["simultaneous", "tdm", "bpm", "ddm"] = "simultaneous"
     line: Annotated[int, Field(ge=1)] | None = None
     tx: tuple[Vector3, ...] | None = None
     rx: tuple[Vector3, ...] | None = None
     tx_m: tuple[Vector3, ...] | None = None
     rx_m: tuple[Vector3, ...] | None = None
     design_frequency_hz: Positive | None = None
+    empty_subbands: Annotated[int, Field(ge=1)] = 1
 
     @model_validator(mode="after")
     def _one_way_to_say_it(self) -> Self:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..io.npz import load_npz, save_npz
 from ..scatterers import Weather
 from . import angle
-from .multiplex import LoopCode
+from .multiplex import LoopCode, strongest_alias
 from .spectra import doppler_spectrum, range_spectrum
 from .windows import window
 
@@ -160,6 +160,8 @@ class RadarCube:
         )
         n_range, n_velocity, _ = self.data.shape
         snapshots = self.data[:, :, self.azimuth_channels]
+        if self.profile.n_subbands > 1:  # one target would show several times, in other directions
+            snapshots = snapshots * strongest_alias(self.range_doppler, self.profile.n_subbands)[:, :, None]
         rows = max(1, _BEAM_CELLS // (n_velocity * len(vectors)))
         parts = [bartlett_max(snapshots[i : i + rows], vectors) for i in range(0, n_range, rows)]
         return np.concatenate(parts)
@@ -249,7 +251,7 @@ def process(
     Raises
     ------
     InputError
-        Unknown window, or a transform shorter than the data.
+        Unknown window, a transform shorter than the data, or under DDM one that sub-bands do not divide.
     """
     profile = adc.profile
     w = profile.waveform
@@ -257,6 +259,11 @@ def process(
     if lengths[0] < w.samples or lengths[1] < w.chirps:
         raise InputError(
             f"process: n_fft {lengths} is shorter than the data; at least ({w.samples}, {w.chirps}) = (samples, loops)"
+        )
+    if lengths[1] % profile.n_subbands:
+        raise InputError(
+            f"process: n_fft {lengths}: multiplex ddm needs a Doppler transform of a multiple of the "
+            f"{profile.n_subbands} sub-bands"
         )
     ranges = range_spectrum(adc.data, name=range_window, n_fft=lengths[0], real=w.adc == "real")
     data = doppler_spectrum(

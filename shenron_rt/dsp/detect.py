@@ -18,6 +18,7 @@ from .cfar import cfar_threshold, default_window
 from .detections import DETECTION_DTYPE, Detections
 from .directions import coarse_direction, distinct, second_direction
 from .elements import Elements
+from .multiplex import strongest_alias
 from .refine import Axis, PeakFit, PeakPatch, at_peak, fit_peaks, without
 from .spectra import slow_time_offsets
 from .truth import Attribution, attribute
@@ -126,7 +127,7 @@ def detect(
     threshold = noise_threshold(cube, pfa=pfa, cfar=cfar)
     hits = power > threshold
     hits &= (cube.range_m >= blanking_m)[:, None]
-    row, column = np.nonzero(hits & local_maxima(power))
+    row, column = np.nonzero(hits & local_maxima(power) & strongest_alias(power, cube.profile.n_subbands))
     peaks = _estimate(cube, row, column, threshold)
     table, chain, ghost = _table(cube, peaks)
     if others is not None:

@@ -26,7 +26,8 @@ class AdcCube:
     Parameters
     ----------
     data : (n_loops, n_virtual, n_samples) complex128
-        sqrt(W) RMS at the receiver input; virtual = tx * n_rx + rx. A real ADC leaves the imaginary part zero.
+        sqrt(W) RMS at the receiver input; virtual = tx * n_rx + rx. A real ADC leaves the imaginary part zero, but for
+        DDM: there every channel is its receiver, turned back by the ramp of its transmitter.
     profile : RadarProfile
         The radar that made it; all axes derive from it.
     noise_power_w : float

@@ -94,8 +94,8 @@ def _fast(profile: RadarProfile, points: Points, accuracy: float) -> ComplexArra
     surface may leave far less.
     """
     clean = transmitted(profile, points, nufft_field(accuracy))
-    # every raw chirp under BPM carries all transmitters
-    n_sent = profile.n_tx if profile.array.multiplex == "bpm" else 1
+    # every raw chirp under BPM and DDM carries all transmitters
+    n_sent = profile.n_tx if profile.array.multiplex in ("bpm", "ddm") else 1
     incoherent = np.sqrt(n_sent * np.sum(np.abs(points.amplitude) ** 2))
     rms = np.sqrt(np.mean(clean.real**2 + clean.imag**2))
     if rms >= CANCELLATION * incoherent:
