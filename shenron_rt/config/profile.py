@@ -50,13 +50,27 @@ class Antenna(ConfigModel):
 
 
 class Receiver(ConfigModel):
-    """Levels and the receiver chain."""
+    """Levels and the receiver chain.
+
+    ``phase_noise_dbc_hz`` lists [offset_hz, dbc_hz] of the oscillator that transmitter and mixer share.
+    """
 
     tx_power_dbm: float
     noise_figure_db: Annotated[float, Field(ge=0)]
     temperature_k: Positive = 290.0
     adc_bits: Annotated[int, Field(ge=2, le=24)] | None = None
     full_scale_dbm: float | None = None
+    phase_noise_dbc_hz: tuple[tuple[Positive, float], ...] | None = None
+
+    @model_validator(mode="after")
+    def _offsets_ascend(self) -> Self:
+        offsets = [offset for offset, _ in self.phase_noise_dbc_hz or ()]
+        if self.phase_noise_dbc_hz is not None and (not offsets or sorted(set(offsets)) != offsets):
+            raise ValueError(
+                "phase_noise_dbc_hz: a list of [offset_hz, dbc_hz] with ascending offsets is needed, "
+                f"got offsets {offsets}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _bits_need_a_scale(self) -> Self:

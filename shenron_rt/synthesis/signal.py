@@ -136,10 +136,10 @@ class Clock:
     frame_mid_s: float
 
     @classmethod
-    def of(cls, profile: RadarProfile) -> Clock:
-        """Read the clock of a profile."""
+    def of(cls, profile: RadarProfile, margin: int = 0) -> Clock:
+        """Read the clock of a profile; ``margin`` more samples on both sides."""
         w = profile.waveform
-        times = w.adc_start_s + np.arange(w.samples) / w.sample_rate_hz
+        times = w.adc_start_s + np.arange(-margin, w.samples + margin) / w.sample_rate_hz
         return cls(w.carrier_hz, w.slope_hz_per_s, times, profile.frame_mid_s)
 
     @property
@@ -182,7 +182,7 @@ def doppler_ramps(profile: RadarProfile) -> ComplexArray:
     return np.asarray(np.exp(2j * np.pi / profile.n_subbands * turns), dtype=np.complex128)
 
 
-def transmitted(profile: RadarProfile, points: Points, field: Field) -> ComplexArray:
+def transmitted(profile: RadarProfile, points: Points, field: Field, margin: int = 0) -> ComplexArray:
     """Return what the ADC sees before noise, chirp by chirp.
 
     Parameters
@@ -191,14 +191,16 @@ def transmitted(profile: RadarProfile, points: Points, field: Field) -> ComplexA
     points : Points
     field : callable
         Sums the echoes of one transmitter; see :data:`Field`.
+    margin : int
+        Samples to add before and after the sampled window.
 
     Returns
     -------
-    (n_loops, n_blocks, n_rx, n_samples) complex
+    (n_loops, n_blocks, n_rx, n_samples + 2 margin) complex
         Blocks are transmitters (simultaneous and TDM), the chirps of a loop, in which all transmit (BPM), or the one
         chirp in which all transmit (DDM). sqrt(W).
     """
-    clock, starts = Clock.of(profile), profile.raw_chirp_start_s
+    clock, starts = Clock.of(profile, margin), profile.raw_chirp_start_s
     kind = profile.array.multiplex
     shape = (len(starts), 1 if kind == "ddm" else profile.n_tx, profile.n_rx, len(clock.sample_s))
     raw = np.zeros(shape, dtype=np.complex128)

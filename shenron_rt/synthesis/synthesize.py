@@ -14,6 +14,7 @@ from ..returns import Returns
 from .adc import AdcCube
 from .direct import direct_field
 from .nufft import nufft_field
+from .phase_noise import add_phase_noise, margin_samples
 from .receiver import add_noise, cube_noise_power, quantise, to_adc
 from .signal import Points, decode, hadamard, transmitted
 
@@ -48,7 +49,7 @@ def synthesize(
         Echoes in the radar frame, mid-frame. None at all gives noise alone.
     profile : RadarProfile
     noise : "thermal" or None
-        Thermal noise k T0 F f_s per complex sample, or none.
+        Thermal noise k T0 F f_s per complex sample, and the profile's phase noise; or neither.
     seed : int, optional
         Seed of the noise; None is 0.
     frame : int
@@ -78,7 +79,14 @@ def synthesize(
     _check(profile, noise, accuracy, method)
     seed = 0 if seed is None else int(seed)
     points = Points.from_returns(returns)
-    clean = transmitted(profile, points, direct_field) if method == "direct" else _fast(profile, points, accuracy)
+    shaky = noise is not None and profile.receiver.phase_noise_dbc_hz is not None
+    margin = margin_samples(profile) if shaky else 0
+    if method == "direct":
+        clean = transmitted(profile, points, direct_field, margin)
+    else:
+        clean = _fast(profile, points, accuracy, margin)
+    if shaky:
+        clean = add_phase_noise(profile, points, clean, margin, frame_generator(seed, frame, radar, "phase noise"))
     raw = to_adc(profile, clean)
     if noise is not None:
         add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))
@@ -87,13 +95,13 @@ def synthesize(
     return AdcCube(cube, profile, noise_power_w=power, seed=seed, frame=frame, weather=returns.weather, returns=returns)
 
 
-def _fast(profile: RadarProfile, points: Points, accuracy: float) -> ComplexArray:
+def _fast(profile: RadarProfile, points: Points, accuracy: float, margin: int) -> ComplexArray:
     """Sum by NUFFT; once more, finer, where the echoes cancel to a cube well below the sum of their powers.
 
     The error goes with the root of that sum. Echoes of unrelated phase give a cube of the same RMS; those of a smooth
     surface may leave far less.
     """
-    clean = transmitted(profile, points, nufft_field(accuracy))
+    clean = transmitted(profile, points, nufft_field(accuracy), margin)
     # every raw chirp under BPM and DDM carries all transmitters
     n_sent = profile.n_tx if profile.array.multiplex in ("bpm", "ddm") else 1
     incoherent = np.sqrt(n_sent * np.sum(np.abs(points.amplitude) ** 2))
@@ -102,7 +110,7 @@ def _fast(profile: RadarProfile, points: Points, accuracy: float) -> ComplexArra
         return clean
     finer = max(accuracy * float(rms / incoherent), ACCURACY_LIMIT)
     logger.debug("echoes cancel to %.3g of the root sum of their powers; accuracy %.3g", rms / incoherent, finer)
-    return transmitted(profile, points, nufft_field(finer))
+    return transmitted(profile, points, nufft_field(finer), margin)
 
 
 def _check(profile: RadarProfile, noise: str | None, accuracy: float, method: str) -> None:
