@@ -18,10 +18,14 @@ from .lidar.frame import LidarFrame
 from .returns import Returns, illuminate
 from .scatterers import Scatterers
 from .synthesis import AdcCube, synthesize
+from .synthesis.heard import heard_radars
 from .tracing import trace
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .echo.shenron import ShenronModel
+    from .synthesis.interference import HeardRadar
 
 __all__ = ["Frame", "simulate", "simulate_all"]
 
@@ -161,7 +165,15 @@ def simulate(
         backend=backend,
     )
     return _processed(
-        scatterers, used, source.materials, time=time, model=model, noise=noise, accuracy=accuracy, previous=previous
+        scatterers,
+        used,
+        source.materials,
+        time=time,
+        model=model,
+        noise=noise,
+        accuracy=accuracy,
+        previous=previous,
+        interference=heard_radars(source, place, used, time=time, seed=scatterers.seed, frame=frame),
     )
 
 
@@ -175,6 +187,7 @@ def _processed(
     noise: str | None,
     accuracy: float,
     previous: Frame | None,
+    interference: Sequence[HeardRadar] = (),
 ) -> Frame:
     """Run the chain from scatterers on; it is the same behind both doors."""
     seed, frame, radar = scatterers.seed, scatterers.frame, scatterers.radar
@@ -184,7 +197,16 @@ def _processed(
             "echo model %s gives the counts of the released code, not watts: levels in dBm, SNR and RCS mean nothing",
             returns.model,
         )
-    adc = synthesize(returns, used, noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
+    adc = synthesize(
+        returns,
+        used,
+        noise=noise,
+        seed=seed,
+        frame=frame,
+        accuracy=accuracy,
+        radar=radar,
+        interference=interference,
+    )
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
     detections = detect(

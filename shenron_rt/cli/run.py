@@ -242,6 +242,12 @@ def _write_config(path: Path, scene: Scene) -> None:
         | {"profile": scene.profile_of(r).model_dump(mode="json", exclude_none=True)}
         for r in scene.radars
     ]
+    if scene.interferers:
+        data["interferers"] = [
+            i.model_dump(mode="json", exclude_none=True)
+            | {"profile": scene.profile_of(i).model_dump(mode="json", exclude_none=True)}
+            for i in scene.interferers
+        ]
     located = _locator(scene.folder)
     for part in (*data.get("static", ()), *data.get("actors", ())):
         for key in ("mesh", "resolve", "carla_tags"):

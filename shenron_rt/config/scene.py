@@ -16,6 +16,7 @@ from ..scatterers import Weather
 from ..scene.mesh import TaggedMesh
 from ..tags import SemanticTag
 from ._base import ConfigModel, Placed, Vector3
+from .interferer import Interferer
 from .loader import apply_overrides, read_yaml, validate_model
 from .profile import RadarProfile, load_profile
 
@@ -157,6 +158,7 @@ class Scene(ConfigModel):
     point_targets: tuple[PointTarget, ...] = ()
     radars: tuple[RadarMount, ...] = (RadarMount(),)
     lidars: tuple[LidarMount, ...] = ()
+    interferers: tuple[Interferer, ...] = ()
     #: Options of the run that wrote this file (``config.yaml`` of a run folder); the command line takes them up again.
     run: Mapping[str, Any] = Field(default_factory=dict, repr=False)
     folder: Path = Field(default_factory=Path.cwd, exclude=True, repr=False)
@@ -190,8 +192,8 @@ class Scene(ConfigModel):
                 return radar
         raise InputError(f"no radar {name!r} in the scene; {did_you_mean(name, names)}")
 
-    def profile_of(self, radar: RadarMount) -> RadarProfile:
-        """Return the profile of a radar; a relative path is looked for beside the scene first."""
+    def profile_of(self, radar: RadarMount | Interferer) -> RadarProfile:
+        """Return the profile of a radar, simulated or not; a relative path is looked for beside the scene first."""
         if isinstance(radar.profile, RadarProfile):
             return radar.profile
         beside = self.folder / radar.profile

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..randomness import frame_generator
 from ..returns import Returns
 from .adc import AdcCube
 from .direct import direct_field
+from .interference import HeardRadar, add_interference
 from .nufft import nufft_field
 from .phase_noise import add_phase_noise, margin_samples
 from .receiver import add_noise, cube_noise_power, quantise, to_adc
@@ -40,6 +42,7 @@ def synthesize(
     accuracy: float = 1e-5,
     method: str = "nufft",
     radar: str = "",
+    interference: Sequence[HeardRadar] = (),
 ) -> AdcCube:
     """Synthesise the ADC samples of one frame.
 
@@ -60,6 +63,8 @@ def synthesize(
         ``"direct"`` is the reference sum, about 50 ns for every echo and sample.
     radar : str
         Name of the radar, so that several radars of one frame get noise of their own.
+    interference : sequence of HeardRadar
+        Other radars that send meanwhile, as ``heard_radars`` finds them in a scene.
 
     Returns
     -------
@@ -87,6 +92,7 @@ def synthesize(
         clean = _fast(profile, points, accuracy, margin)
     if shaky:
         clean = add_phase_noise(profile, points, clean, margin, frame_generator(seed, frame, radar, "phase noise"))
+    add_interference(profile, clean, interference)
     raw = to_adc(profile, clean)
     if noise is not None:
         add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))
