@@ -25,7 +25,11 @@ def alike(multiplex: str, **waveform) -> RadarProfile:
     """Return the same array with another multiplexing."""
     data = PROFILE.model_dump()
     return RadarProfile.model_validate(
-        data | {"array": data["array"] | {"multiplex": multiplex}, "waveform": data["waveform"] | waveform}
+        data
+        | {
+            "array": data["array"] | {"multiplex": multiplex, "empty_subbands": 2 if multiplex == "ddm" else None},
+            "waveform": data["waveform"] | waveform,
+        }
     )
 
 
@@ -166,6 +170,7 @@ def test_captures_keep_what_the_receivers_saw(tmp_path: Path):
         ({"waveform.chirps": 190}, "190 chirps do not fill 6 sub-bands"),
         ({"waveform.chirp_period_s": [24e-6, 25e-6]}, "one chirp_period_s is needed"),
         ({"array.empty_subbands": 0}, "greater than or equal to 1"),
+        ({"array.multiplex": "tdm"}, "belongs to multiplex ddm, not to tdm"),
     ],
 )
 def test_frames_that_do_not_divide_are_refused(change, words):

@@ -108,8 +108,8 @@ class RadarProfile(ConfigModel):
         w, loops = self.waveform, self.waveform.chirps // self.waveform.n_bursts
         if loops % self.n_subbands:
             raise ValueError(
-                f"multiplex ddm: {loops} chirps do not fill {self.n_subbands} sub-bands ({self.n_tx} transmitters + "
-                f"{self.array.empty_subbands} empty) evenly; take a multiple of {self.n_subbands}"
+                f"multiplex ddm: {loops} chirps do not fill {self.n_subbands} sub-bands ({self.n_tx} transmitters and "
+                f"the empty ones) evenly; take a multiple of {self.n_subbands}"
             )
         if len(w.periods_s) > w.n_bursts:
             raise ValueError("multiplex ddm: one chirp_period_s is needed, or one for each burst (stagger: burst)")
@@ -154,7 +154,7 @@ class RadarProfile(ConfigModel):
     @property
     def n_subbands(self) -> int:
         """Parts of the Doppler spectrum between which DDM shifts the transmitters, empty ones included; else 1."""
-        return self.n_tx + self.array.empty_subbands if self.array.multiplex == "ddm" else 1
+        return self.n_tx + (self.array.empty_subbands or 1) if self.array.multiplex == "ddm" else 1
 
     @cached_property
     def raw_chirp_start_s(self) -> FloatArray:

@@ -82,7 +82,7 @@ class Array(ConfigModel):
 
     Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at
     z = r. ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
-    ``empty_subbands`` of the Doppler spectrum carry no transmitter under DDM.
+    ``empty_subbands`` of the Doppler spectrum carry no transmitter under DDM, 1 unless it says otherwise.
     """
 
     multiplex: Literal["simultaneous", "tdm", "bpm", "ddm"] = "simultaneous"
@@ -92,7 +92,7 @@ class Array(ConfigModel):
     tx_m: tuple[Vector3, ...] | None = None
     rx_m: tuple[Vector3, ...] | None = None
     design_frequency_hz: Positive | None = None
-    empty_subbands: Annotated[int, Field(ge=1)] = 1
+    empty_subbands: Annotated[int, Field(ge=1)] | None = None
 
     @model_validator(mode="after")
     def _one_way_to_say_it(self) -> Self:
@@ -104,6 +104,8 @@ class Array(ConfigModel):
             raise ValueError("tx and rx are needed together, each with at least one [x, y, z]")
         if ways[2] and not (self.tx_m and self.rx_m):
             raise ValueError("tx_m and rx_m are needed together, each with at least one [x, y, z]")
+        if self.empty_subbands is not None and self.multiplex != "ddm":
+            raise ValueError(f"empty_subbands belongs to multiplex ddm, not to {self.multiplex}")
         if self.line is not None and self.multiplex != "simultaneous":
             raise ValueError(f"multiplex {self.multiplex} needs tx and rx positions; line has one transmitter")
         return self
