@@ -86,7 +86,7 @@ class Processing(ConfigModel):
     doppler_window: WindowName = "hann"
     pfa: Annotated[float, Field(gt=0, lt=1)] = 1e-3
     blanking_m: Annotated[float, Field(ge=0)] = 0.0
-    ambiguity: Literal["staggered", "two_frame"] | None = None
+    ambiguity: Literal["staggered", "two_frame", "tdm_phase"] | None = None
 
 
 class RadarProfile(ConfigModel):

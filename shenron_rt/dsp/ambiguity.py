@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["AMBIGUITY_METHODS", "Look", "Unfolding", "least_interval_s", "other_looks", "unfold"]
 
 #: What ``detect`` takes for ``ambiguity``.
-AMBIGUITY_METHODS = ("staggered", "two_frame")
+AMBIGUITY_METHODS = ("staggered", "two_frame", "tdm_phase")
 #: No target closes or recedes faster [m/s]: two cars at 180 km/h each.
 VELOCITY_LIMIT_MPS = 100.0
 #: How far off a target may be from where a velocity puts it: [range and Doppler bins], [m/s^2] of a braking car, [dB].
@@ -91,7 +91,7 @@ def other_looks(
     interval_s: float | None,
     detect: Callable[[RadarCube], Detections],
 ) -> list[Look]:
-    """Return what a method compares the detections of ``cube`` with; nothing where there is no previous frame.
+    """Return what a method compares the detections of ``cube`` with; nothing where it needs none or there is none.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def other_looks(
                 f"{cube.profile.name!r} has one burst a frame"
             )
         return [Look(detect(burst).table, burst.profile, 0.0, burst.mid_offset_s) for burst in cube.bursts[1:]]
-    if previous is None:
+    if method == "tdm_phase" or previous is None:
         return []
     if interval_s is None or not interval_s > 0:
         raise InputError(f"detect: ambiguity 'two_frame' needs interval_s > 0 with a previous frame, got {interval_s}")

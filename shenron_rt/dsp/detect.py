@@ -21,6 +21,7 @@ from .elements import Elements
 from .multiplex import strongest_alias
 from .refine import Axis, PeakFit, PeakPatch, at_peak, fit_peaks, without
 from .spectra import slow_time_offsets
+from .tdm_phase import unfold_by_phase
 from .truth import Attribution, attribute
 
 if TYPE_CHECKING:
@@ -95,9 +96,10 @@ def detect(
     cfar : {"ca", "go", "so", "os"}
     blanking_m : float
         Cells nearer than this are not looked at [m].
-    ambiguity : {None, "staggered", "two_frame"}
-        How to unfold velocities: by the bursts of a frame with ``stagger: burst``, or by the range change since the
-        ``previous`` frame. A row without a unique answer stays folded and is marked ``ambiguous``.
+    ambiguity : {None, "staggered", "two_frame", "tdm_phase"}
+        How to unfold velocities: by the bursts of a frame with ``stagger: burst``, by the range change since the
+        ``previous`` frame, or by the phases of transmitters that take turns. A row without a unique answer stays folded
+        and is marked ``ambiguous``.
     previous : Detections, optional
         Of an earlier frame of the same radar, for ``two_frame``; without them no row is unfolded.
     interval_s : float, optional
@@ -131,7 +133,10 @@ def detect(
     peaks = _estimate(cube, row, column, threshold)
     table, chain, ghost = _table(cube, peaks)
     if others is not None:
-        found = unfold(Look(table, cube.profile, 0.0, cube.mid_offset_s), others)
+        if ambiguity == "tdm_phase":
+            found = unfold_by_phase(cube, table["velocity"], peaks.cells, partial(_turned, cube))
+        else:
+            found = unfold(Look(table, cube.profile, 0.0, cube.mid_offset_s), others)
         peaks, resolved = _unfolded(cube, peaks, found, threshold)
         table, chain, ghost = _table(cube, peaks)
         table["ambiguous"] |= ~resolved
