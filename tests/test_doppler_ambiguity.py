@@ -118,6 +118,18 @@ def test_bursts_unfold_in_noise():
         assert not mine["ambiguous"]
 
 
+def test_false_alarms_of_a_burst_are_the_design():
+    hits, cells = 0, 0
+    for seed in range(20):
+        cube = process(synthesize(point_returns(STAGGERED, np.zeros(0)), STAGGERED, seed=seed))
+        hits += detect(cube).n_cfar_hits
+        cells += cube.bursts[0].range_doppler.size
+        for burst in cube.bursts:
+            assert burst.range_doppler.mean() == pytest.approx(burst.noise_power_w, rel=0.02)
+    # 20 x 16384 cells at 1e-3, variance 1.6 times binomial
+    assert hits == pytest.approx(1e-3 * cells, abs=3 * np.sqrt(1.6e-3 * cells))
+
+
 def test_without_a_method_the_first_burst_is_reported_folded():
     top = found(STAGGERED, 80.0, -27.7).table[0]
     assert top["velocity"] == pytest.approx(-27.7 + 2 * PLAIN.max_velocity_mps, abs=0.02)
