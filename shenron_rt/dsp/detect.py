@@ -38,11 +38,16 @@ _QUIET_FLOOR = 1e-4
 _SHORT, _TURNS = 2, 2
 
 
-def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> FloatArray:
-    """Return the CFAR threshold of every range-Doppler cell, (n_range, n_velocity) [W]; arguments as :func:`detect`."""
+def noise_threshold(
+    cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca", power: FloatArray | None = None
+) -> FloatArray:
+    """Return the CFAR threshold of every range-Doppler cell, (n_range, n_velocity) [W]; arguments as :func:`detect`.
+
+    ``power`` (n_range, n_velocity) takes the place of the cube's own map: what the threshold were over another one [W].
+    """
     w = cube.profile.waveform
     windows, lengths = (cube.range_window, cube.doppler_window), (w.samples, w.chirps)
-    power = cube.range_doppler
+    power = cube.range_doppler if power is None else power
     shape = default_window((power.shape[0], power.shape[1]), windows, lengths, cube.n_fft)
     return cfar_threshold(
         power,

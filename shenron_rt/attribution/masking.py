@@ -1,0 +1,200 @@
+"""Whether something else hides an object in the cube: shown by taking it out and detecting again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._typing import FloatArray
+from ..dsp import RadarCube, detect, noise_threshold, process
+from .cells import Look
+from .contributions import Contributions
+from .echoes import MAIN_LOBE_BINS, middle_of, near_cell
+from .records import Share, Verdict
+from .sources import Case
+from .waterfall import db
+
+__all__ = ["found_in", "masked", "shares"]
+
+#: Others that are taken out one by one.
+_TRIED = 3
+#: Echoes within the main lobe with this part of what another object leaves in the cell make it a neighbour.
+_NEIGHBOUR = 0.1
+#: Another object that leaves this part of the object's own power in its cell fills it.
+_FILLS = 0.25
+#: Windows with low side lobes, tried as a remedy.
+_LOW_SIDE_LOBES = "blackmanharris"
+
+
+def found_in(cube: RadarCube, object_id: int) -> bool:
+    """Tell whether detection with the profile's settings finds the object in a cube."""
+    settings = cube.profile.processing
+    found = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
+    return bool(np.any(found.object_id == object_id))
+
+
+def shares(contributions: Contributions, look: Look, others: list[int], own: int, names: Mapping[int, str]) -> Any:
+    """Return the :class:`Share` of every object, and of noise, in a cell and in its threshold; strongest first."""
+    cube = contributions.cube
+    pfa = cube.profile.processing.pfa
+
+    def share(number: int, name: str, power: FloatArray) -> Share:
+        level = noise_threshold(cube, pfa=pfa, power=power)[look.row, look.column] if power.any() else 0.0
+        return Share(number, name, db(float(power[look.row, look.column])) + 30, db(float(level)) + 30)
+
+    rows = [share(i, names.get(i, f"object {i}"), contributions.map_of(i)) for i in [own, *others]]
+    rows.append(share(-1, "noise", np.full(cube.range_doppler.shape, cube.noise_power_w)))
+    return tuple(sorted(rows, key=lambda s: -max(s.cell_dbm, s.threshold_dbm)))
+
+
+@dataclass(frozen=True)
+class _Masker:
+    """What masks an object, and how: ``cell``, ``side lobe``, ``threshold`` or ``ambiguous``."""
+
+    object_id: int
+    name: str
+    how: str
+    alone: bool
+    cell_db: float
+    threshold_db: float
+    velocity_mps: float
+
+
+def masked(case: Case, contributions: Contributions, object_id: int, look: Look, others: list[int]) -> Verdict | None:
+    """Return the verdict on an object that is over the threshold of noise and yet not detected.
+
+    Returns
+    -------
+    Verdict or None
+        ``None`` where it is not found without the others either.
+    """
+    if not found_in(contributions.without(others), object_id):
+        return None
+    masker = _masker(case, contributions, object_id, look, others)
+    own = db(contributions.map_of(object_id)[look.row, look.column])
+    mine = middle_of(contributions.returns_of(object_id))
+    numbers = {
+        "own_dbm": own + 30,
+        "masker_in_cell_db": masker.cell_db,
+        "masker_in_threshold_db": masker.threshold_db,
+        "true_velocity_mps": mine.velocity_mps,
+        "folded_velocity_mps": look.velocity_mps,
+        "masker_velocity_mps": masker.velocity_mps,
+        "max_velocity_mps": case.cube.profile.max_velocity_mps,
+        "found_without": [masker.object_id] if masker.alone else others,
+    }
+    if masker.how == "ambiguous":
+        text = (
+            f"ambiguous in Doppler: {mine.velocity_mps:+.1f} m/s and {masker.name}'s {masker.velocity_mps:+.1f} m/s "
+            f"fold into the same cells (v_max {case.cube.profile.max_velocity_mps:.1f} m/s)"
+        )
+        change = _unfold(case, max(abs(mine.velocity_mps), abs(masker.velocity_mps)))
+        return Verdict("ambiguous in Doppler", text, numbers, change, masker.name)
+    phrase = {
+        "cell": f"masked by {masker.name}, which shares its cell {masker.cell_db:+.1f} dB stronger",
+        "side lobe": f"masked by {masker.name}'s side lobe, {masker.cell_db:+.1f} dB over it in its cell",
+        "threshold": f"masked by {masker.name}, which lifts the threshold there {masker.threshold_db:+.1f} dB over it",
+    }[masker.how]
+    return Verdict(
+        "masked", phrase, numbers, _remedy(case, contributions, object_id, look, masker, mine.velocity_mps), masker.name
+    )
+
+
+def _masker(case: Case, contributions: Contributions, own: int, look: Look, others: list[int]) -> _Masker:
+    """Return what masks: the strongest neighbour whose removal alone suffices, else the strongest."""
+    ranked = sorted(others, key=lambda i: -max(_levels(contributions, look, i)))
+    alone = next((i for i in ranked[:_TRIED] if found_in(contributions.without([i]), own)), None)
+    first = ranked[0] if alone is None else alone
+    in_cell, in_threshold = _levels(contributions, look, first)
+    mine = contributions.map_of(own)[look.row, look.column]
+    name = case.names.get(first, f"object {first}")
+    theirs = contributions.returns_of(first)
+    near_range, near_doppler = near_cell(look, theirs)
+    near = near_range & near_doppler
+    power = np.abs(theirs.amplitude) ** 2
+    velocity = middle_of(theirs).velocity_mps
+    how = "side lobe"
+    if in_cell < _FILLS * mine:
+        how = "threshold"
+    elif float(power[near].sum()) >= _NEIGHBOUR * in_cell:
+        how = "ambiguous" if _only_folded(contributions, own, first, look) else "cell"
+    return _Masker(first, name, how, alone is not None, db(in_cell / mine), db(in_threshold / mine), velocity)
+
+
+def _levels(contributions: Contributions, look: Look, number: int) -> tuple[float, float]:
+    """Return an object's strongest power in the cells around one, and what it adds to the threshold there [W]."""
+    power = contributions.map_of(number)
+    n_range, n_velocity = power.shape
+    rows = np.clip(look.row + np.arange(-1, 2), 0, n_range - 1)
+    columns = (look.column + np.arange(-1, 2)) % n_velocity
+    level = noise_threshold(contributions.cube, pfa=contributions.cube.profile.processing.pfa, power=power)
+    return float(power[np.ix_(rows, columns)].max()), float(level[look.row, look.column])
+
+
+def _only_folded(contributions: Contributions, own: int, other: int, look: Look) -> bool:
+    """Tell whether two objects share a cell only because their velocities fold."""
+    p = contributions.cube.profile
+    mine, theirs = (middle_of(contributions.returns_of(i)).velocity_mps for i in (own, other))
+    lobe = MAIN_LOBE_BINS[contributions.cube.doppler_window] * p.velocity_resolution_mps
+    folds = max(abs(mine), abs(theirs)) >= p.max_velocity_mps
+    return folds and abs(mine - theirs) > 2 * lobe
+
+
+def _unfold(case: Case, velocity_mps: float) -> str:
+    p = case.cube.profile
+    longest = p.wavelength_m / (4 * velocity_mps)
+    return (
+        f"repeat the chirps every {longest / p.n_chirps_per_loop * 1e6:.1f} us or faster "
+        f"(now {float(np.mean(p.waveform.periods_s)) * 1e6:.1f} us): v_max is then {velocity_mps:.1f} m/s"
+    )
+
+
+def _remedy(
+    case: Case, contributions: Contributions, own: int, look: Look, masker: _Masker, velocity_mps: float
+) -> str:
+    """Return the first change that was tried and works, or the separation that is lacking."""
+    for windows in _other_windows(case.cube):
+        again = process(case.adc(), range_window=windows[0], doppler_window=windows[1], n_fft=case.cube.n_fft)
+        if found_in(replace(again, returns=case.returns), own):
+            changed = [
+                f"--set processing.{axis}_window={name}"
+                for axis, name, now in zip(
+                    ("range", "doppler"), windows, (case.cube.range_window, case.cube.doppler_window), strict=True
+                )
+                if name != now
+            ]
+            return f"process with {' '.join(changed)}: tried, it is detected"
+    p = case.cube.profile
+    theirs = middle_of(contributions.returns_of(masker.object_id))
+    mine = middle_of(contributions.returns_of(own))
+    apart_r = abs(mine.range_m - theirs.range_m) / p.range_resolution_m
+    apart_v = abs(mine.velocity_mps - theirs.velocity_mps) / p.velocity_resolution_mps
+    return _finer(case, apart_r, apart_v, masker)
+
+
+def _other_windows(cube: RadarCube) -> Iterator[tuple[str, str]]:
+    """Yield pairs of windows that are not the cube's, the smallest change first."""
+    low = _LOW_SIDE_LOBES
+    for pair in ((low, cube.doppler_window), (cube.range_window, low), (low, low)):
+        if pair != (cube.range_window, cube.doppler_window):
+            yield pair
+
+
+def _finer(case: Case, apart_r: float, apart_v: float, masker: _Masker) -> str:
+    """Say how much finer an axis must be to part two objects that are so many bins apart."""
+    cube, p = case.cube, case.cube.profile
+    options = {
+        "bandwidth": (apart_r, MAIN_LOBE_BINS[cube.range_window]),
+        "frame time": (apart_v, MAIN_LOBE_BINS[cube.doppler_window]),
+    }
+    what, (apart, lobe) = max(options.items(), key=lambda item: item[1][0] / item[1][1])
+    if apart < 0.1:
+        return f"take {masker.name} away: both stand in one cell"
+    factor = max(2 * lobe / apart, 1.5)
+    now = p.waveform.bandwidth_hz / 1e6 if what == "bandwidth" else p.waveform.chirps * p.loop_period_s * 1e3
+    unit = "MHz" if what == "bandwidth" else "ms"
+    return f"{math.ceil(factor * 10) / 10:g} times the {what} ({factor * now:.3g} {unit}) parts it from {masker.name}"
