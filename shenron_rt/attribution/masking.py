@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from .._typing import FloatArray
-from ..dsp import RadarCube, detect, noise_threshold, process
+from ..dsp import noise_threshold
 from .cells import Look
 from .contributions import Contributions
 from .echoes import MAIN_LOBE_BINS, middle_of, near_cell
 from .records import Share, Verdict
+from .remedies import found_in, process_remedy, unfolding_remedy, waveform_remedy
 from .sources import Case
 from .waterfall import db
 
-__all__ = ["found_in", "masked", "shares"]
+__all__ = ["masked", "shares"]
 
 #: Others that are taken out one by one.
 _TRIED = 3
@@ -26,19 +25,12 @@ _TRIED = 3
 _NEIGHBOUR = 0.1
 #: Another object that leaves this part of the object's own power in its cell fills it.
 _FILLS = 0.25
-#: Windows with low side lobes, tried as a remedy.
-_LOW_SIDE_LOBES = "blackmanharris"
 
 
-def found_in(cube: RadarCube, object_id: int) -> bool:
-    """Tell whether detection with the profile's settings finds the object in a cube."""
-    settings = cube.profile.processing
-    found = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
-    return bool(np.any(found.object_id == object_id))
-
-
-def shares(contributions: Contributions, look: Look, others: list[int], own: int, names: Mapping[int, str]) -> Any:
-    """Return the :class:`Share` of every object, and of noise, in a cell and in its threshold; strongest first."""
+def shares(
+    contributions: Contributions, look: Look, others: list[int], own: int, names: Mapping[int, str]
+) -> tuple[Share, ...]:
+    """Return the share of every object, and of noise, in a cell and in its threshold; strongest first."""
     cube = contributions.cube
     pfa = cube.profile.processing.pfa
 
@@ -92,16 +84,15 @@ def masked(case: Case, contributions: Contributions, object_id: int, look: Look,
             f"ambiguous in Doppler: {mine.velocity_mps:+.1f} m/s and {masker.name}'s {masker.velocity_mps:+.1f} m/s "
             f"fold into the same cells (v_max {case.cube.profile.max_velocity_mps:.1f} m/s)"
         )
-        change = _unfold(case, max(abs(mine.velocity_mps), abs(masker.velocity_mps)))
+        fastest = max(mine.velocity_mps, masker.velocity_mps, key=abs)
+        change = unfolding_remedy(case, object_id, fastest)
         return Verdict("ambiguous in Doppler", text, numbers, change, masker.name)
     phrase = {
         "cell": f"masked by {masker.name}, which shares its cell {masker.cell_db:+.1f} dB stronger",
         "side lobe": f"masked by {masker.name}'s side lobe, {masker.cell_db:+.1f} dB over it in its cell",
         "threshold": f"masked by {masker.name}, which lifts the threshold there {masker.threshold_db:+.1f} dB over it",
     }[masker.how]
-    return Verdict(
-        "masked", phrase, numbers, _remedy(case, contributions, object_id, look, masker, mine.velocity_mps), masker.name
-    )
+    return Verdict("masked", phrase, numbers, _remedy(case, object_id, masker), masker.name)
 
 
 def _masker(case: Case, contributions: Contributions, own: int, look: Look, others: list[int]) -> _Masker:
@@ -144,57 +135,9 @@ def _only_folded(contributions: Contributions, own: int, other: int, look: Look)
     return folds and abs(mine - theirs) > 2 * lobe
 
 
-def _unfold(case: Case, velocity_mps: float) -> str:
-    p = case.cube.profile
-    longest = p.wavelength_m / (4 * velocity_mps)
-    return (
-        f"repeat the chirps every {longest / p.n_chirps_per_loop * 1e6:.1f} us or faster "
-        f"(now {float(np.mean(p.waveform.periods_s)) * 1e6:.1f} us): v_max is then {velocity_mps:.1f} m/s"
-    )
-
-
-def _remedy(
-    case: Case, contributions: Contributions, own: int, look: Look, masker: _Masker, velocity_mps: float
-) -> str:
-    """Return the first change that was tried and works, or the separation that is lacking."""
-    for windows in _other_windows(case.cube):
-        again = process(case.adc(), range_window=windows[0], doppler_window=windows[1], n_fft=case.cube.n_fft)
-        if found_in(replace(again, returns=case.returns), own):
-            changed = [
-                f"--set processing.{axis}_window={name}"
-                for axis, name, now in zip(
-                    ("range", "doppler"), windows, (case.cube.range_window, case.cube.doppler_window), strict=True
-                )
-                if name != now
-            ]
-            return f"process with {' '.join(changed)}: tried, it is detected"
-    p = case.cube.profile
-    theirs = middle_of(contributions.returns_of(masker.object_id))
-    mine = middle_of(contributions.returns_of(own))
-    apart_r = abs(mine.range_m - theirs.range_m) / p.range_resolution_m
-    apart_v = abs(mine.velocity_mps - theirs.velocity_mps) / p.velocity_resolution_mps
-    return _finer(case, apart_r, apart_v, masker)
-
-
-def _other_windows(cube: RadarCube) -> Iterator[tuple[str, str]]:
-    """Yield pairs of windows that are not the cube's, the smallest change first."""
-    low = _LOW_SIDE_LOBES
-    for pair in ((low, cube.doppler_window), (cube.range_window, low), (low, low)):
-        if pair != (cube.range_window, cube.doppler_window):
-            yield pair
-
-
-def _finer(case: Case, apart_r: float, apart_v: float, masker: _Masker) -> str:
-    """Say how much finer an axis must be to part two objects that are so many bins apart."""
-    cube, p = case.cube, case.cube.profile
-    options = {
-        "bandwidth": (apart_r, MAIN_LOBE_BINS[cube.range_window]),
-        "frame time": (apart_v, MAIN_LOBE_BINS[cube.doppler_window]),
-    }
-    what, (apart, lobe) = max(options.items(), key=lambda item: item[1][0] / item[1][1])
-    if apart < 0.1:
-        return f"take {masker.name} away: both stand in one cell"
-    factor = max(2 * lobe / apart, 1.5)
-    now = p.waveform.bandwidth_hz / 1e6 if what == "bandwidth" else p.waveform.chirps * p.loop_period_s * 1e3
-    unit = "MHz" if what == "bandwidth" else "ms"
-    return f"{math.ceil(factor * 10) / 10:g} times the {what} ({factor * now:.3g} {unit}) parts it from {masker.name}"
+def _remedy(case: Case, object_id: int, masker: _Masker) -> str:
+    """Return the first change that was tried and works; taking the other away always does."""
+    away = f"take {masker.name} away: tried, it is detected then"
+    if not masker.alone:
+        away = "take its neighbours away: tried, it is detected then"
+    return process_remedy(case, object_id) or waveform_remedy(case, object_id) or away
