@@ -30,6 +30,7 @@ LAYERS = (
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable",),
     ("runs",),
+    ("attribution",),  # reads run folders
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page
     ("cli",),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from .cells import Look, look_at_peak
 from .contributions import Contributions
 from .echoes import Middle, detection_labels, looks_of, middle_of
 from .masking import shares
-from .records import FrameExplanation, ObjectExplanation
+from .records import FrameExplanation, ObjectExplanation, Peak
 from .sources import Case, cases
 from .unhidden import projected_area
 from .verdict import Judge
@@ -50,6 +50,12 @@ class Explanation:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON."""
         return {"frames": [frame.to_dict() for frame in self.frames]}
+
+    def evidence(self) -> list[dict[str, Any]]:
+        """Return the strongest peak of every frame: frame, radar, range, azimuth, level, and whose it is."""
+        return [
+            {"frame": f.frame, "radar": f.radar} | asdict(f.strongest) for f in self.frames if f.strongest is not None
+        ]
 
 
 def explain(
@@ -122,7 +128,7 @@ def _explain_frame(case: Case, wanted: int | None) -> FrameExplanation:
         ids = [wanted]
     view = _View(case, contributions, judge, labels, looks, echoing)
     objects = tuple(view.explained(i) for i in ids)
-    return FrameExplanation(case.radar, case.frame, case.time, objects, labels)
+    return FrameExplanation(case.radar, case.frame, case.time, objects, labels, view.strongest())
 
 
 @dataclass(frozen=True)
@@ -158,6 +164,22 @@ class _View:
             **_place(middle),
             **self._cell(number, look, middle, others),
         )
+
+    def strongest(self) -> Peak | None:
+        """Return the strongest cell of the range-azimuth map beyond blanking."""
+        cube = self.case.cube
+        power = cube.range_azimuth[self.judge.first_row :]
+        if not power.max(initial=0.0) > 0:
+            return None
+        i, j = (int(v) for v in np.unravel_index(int(power.argmax()), power.shape))
+        row, sine = i + self.judge.first_row, float(cube.azimuth_sine[j])
+        columns = [Look(cube, row, c, row * cube.range_step_m, 0.0, sine, 0.0) for c in range(cube.data.shape[1])]
+        look = max(columns, key=lambda at: abs(at.beamformed(cube)))
+        levels = {i: abs(look.beamformed(self.contributions.of(i))) for i in self.power_w}
+        best = max(levels, key=lambda i: levels[i], default=-1)
+        name = "noise" if best < 0 else self.case.names.get(best, f"object {best}" if best else "static")
+        azimuth = float(np.degrees(cube.azimuth_rad[j]))
+        return Peak(float(cube.range_m[row]), azimuth, db(float(power[i, j])) + 30, best, name)
 
     def _look(self, number: int, detections: tuple[int, ...]) -> Look | None:
         """Return the cell of the strongest detection, else that of the object's own peak."""

@@ -64,7 +64,7 @@ def masked(case: Case, contributions: Contributions, object_id: int, look: Look,
     Verdict or None
         ``None`` where it is not found without the others either.
     """
-    if not found_in(contributions.without(others), object_id):
+    if not others or not found_in(contributions.without(others), object_id):
         return None
     masker = _masker(case, contributions, object_id, look, others)
     own = db(contributions.map_of(object_id)[look.row, look.column])

@@ -6,7 +6,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-__all__ = ["VERDICTS", "Cell", "FrameExplanation", "ObjectExplanation", "Share", "Stage", "Verdict", "Waterfall"]
+__all__ = [
+    "VERDICTS",
+    "Cell",
+    "FrameExplanation",
+    "ObjectExplanation",
+    "Peak",
+    "Share",
+    "Stage",
+    "Verdict",
+    "Waterfall",
+]
 
 VerdictName = Literal[
     "detected", "below noise", "masked", "outside the beam", "ambiguous in Doppler", "occluded", "specular away",
@@ -168,6 +178,17 @@ class ObjectExplanation:
 
 
 @dataclass(frozen=True)
+class Peak:
+    """The strongest cell of the range-azimuth map, and whose it is: the object that leaves most in it."""
+
+    range_m: float
+    azimuth_deg: float
+    level_dbm: float
+    object_id: int
+    name: str
+
+
+@dataclass(frozen=True)
 class FrameExplanation:
     """All objects of one frame of one radar; ``detection_labels`` tells of every detection what it is."""
 
@@ -176,6 +197,7 @@ class FrameExplanation:
     time_s: float
     objects: tuple[ObjectExplanation, ...]
     detection_labels: tuple[str, ...]
+    strongest: Peak | None = None
 
     def __repr__(self) -> str:
         seen = sum(o.verdict.name == "detected" for o in self.objects)

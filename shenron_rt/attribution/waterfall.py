@@ -155,7 +155,7 @@ def _processing_stages(
         ledger.add(f"{axis} window", -db(_noise_bandwidth(name, count)), "dB", f"{name}, its noise bandwidth")
         ledger.add(f"{axis} spread and straddling", db(after / before), "dB", "what falls into other cells")
     ledger.add("array", db(profile.n_virtual), "dB", f"{profile.n_virtual} channels in phase")
-    ledger.add("array mismatch", db(in_beam / in_cell), "dB", "directions beside the beam, folded TDM phase")
+    ledger.add("array mismatch", db(in_beam / in_cell), "dB", "other directions, folded TDM phase")
 
 
 def _mean_power(x: ComplexArray) -> float:
