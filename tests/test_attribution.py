@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from explain_tools import BIKE, FAST, GANTRY, PLATE, SPECK, TRUCK, VAN, WALKER, made_scene, two_points
+from explain_reasons import BIKE, FAST, GANTRY, PLATE, SPECK, TRUCK, VAN, WALKER, made_scene
+from explain_tools import two_points
 
 import shenron_rt as srt
 from shenron_rt.attribution import Contributions, Explanation

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray
-from ..dsp import RadarCube, process
+from ..dsp import RadarCube, noise_threshold, process
+from ..dsp.spectra import range_spectrum
 from ..returns import Returns
 from ..synthesis import AdcCube, synthesize
 
@@ -49,6 +50,8 @@ class Contributions:
     accuracy: float = ACCURACY
     _kept: OrderedDict[int, RadarCube] = field(default_factory=OrderedDict, repr=False)
     _kept_bytes: int = field(default=0, repr=False)
+    _levels: dict[int, tuple[float, FloatArray]] = field(default_factory=dict, repr=False)
+    _thresholds: dict[int, FloatArray] = field(default_factory=dict, repr=False)
 
     @property
     def ids(self) -> list[int]:
@@ -85,13 +88,30 @@ class Contributions:
         if object_id in self._kept:
             self._kept.move_to_end(object_id)
             return self._kept[object_id]
-        made = self.processed(self.samples(object_id))
+        samples = self.samples(object_id)
+        self._levels[object_id] = self._measured(samples)
+        made = self.processed(samples)
         self._kept[object_id] = made
         self._kept_bytes += made.data.nbytes
         while self._kept_bytes > _KEEP_BYTES and len(self._kept) > 1:
             _, oldest = self._kept.popitem(last=False)
             self._kept_bytes -= oldest.data.nbytes
         return made
+
+    def _measured(self, samples: AdcCube) -> tuple[float, FloatArray]:
+        real = self.cube.profile.waveform.adc == "real"
+        ranges = range_spectrum(samples.data, name=self.cube.range_window, n_fft=self.cube.n_fft[0], real=real)
+        profile = np.mean(ranges.real**2 + ranges.imag**2, axis=(0, 1))
+        return float(np.mean(np.abs(samples.data) ** 2)), np.asarray(profile, dtype=np.float64)
+
+    def levels(self, object_id: int) -> tuple[float, FloatArray]:
+        """Return mean power of an object's samples, and of its range bins (n_range,) before the Doppler transform [W].
+
+        Means over loops and channels.
+        """
+        if object_id not in self._levels:
+            self.of(object_id)
+        return self._levels[object_id]
 
     def without(self, object_ids: list[int]) -> RadarCube:
         """Return the frame's own cube, noise included, with some objects taken out."""
@@ -104,3 +124,10 @@ class Contributions:
     def map_of(self, object_id: int) -> FloatArray:
         """Return (n_range, n_velocity) the object's power, mean over the channels [W]."""
         return self.of(object_id).range_doppler
+
+    def threshold_of(self, object_id: int) -> FloatArray:
+        """Return (n_range, n_velocity) the CFAR threshold that the object alone would set [W]."""
+        if object_id not in self._thresholds:
+            pfa = self.cube.profile.processing.pfa
+            self._thresholds[object_id] = noise_threshold(self.cube, pfa=pfa, power=self.map_of(object_id))
+        return self._thresholds[object_id]

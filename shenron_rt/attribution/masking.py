@@ -31,15 +31,18 @@ def shares(
     contributions: Contributions, look: Look, others: list[int], own: int, names: Mapping[int, str]
 ) -> tuple[Share, ...]:
     """Return the share of every object, and of noise, in a cell and in its threshold; strongest first."""
-    cube = contributions.cube
-    pfa = cube.profile.processing.pfa
+    cube, at = contributions.cube, (look.row, look.column)
 
-    def share(number: int, name: str, power: FloatArray) -> Share:
-        level = noise_threshold(cube, pfa=pfa, power=power)[look.row, look.column] if power.any() else 0.0
-        return Share(number, name, db(float(power[look.row, look.column])) + 30, db(float(level)) + 30)
+    def share(number: int, name: str, power: FloatArray, threshold: FloatArray) -> Share:
+        return Share(number, name, db(float(power[at])) + 30, db(float(threshold[at])) + 30)
 
-    rows = [share(i, names.get(i, f"object {i}"), contributions.map_of(i)) for i in [own, *others]]
-    rows.append(share(-1, "noise", np.full(cube.range_doppler.shape, cube.noise_power_w)))
+    rows = [
+        share(i, names.get(i, f"object {i}"), contributions.map_of(i), contributions.threshold_of(i))
+        for i in [own, *others]
+    ]
+    noise = np.full(cube.range_doppler.shape, cube.noise_power_w)
+    level = noise_threshold(cube, pfa=cube.profile.processing.pfa, power=noise)
+    rows.append(share(-1, "noise", noise, level))
     return tuple(sorted(rows, key=lambda s: -max(s.cell_dbm, s.threshold_dbm)))
 
 
@@ -122,8 +125,8 @@ def _levels(contributions: Contributions, look: Look, number: int) -> tuple[floa
     n_range, n_velocity = power.shape
     rows = np.clip(look.row + np.arange(-1, 2), 0, n_range - 1)
     columns = (look.column + np.arange(-1, 2)) % n_velocity
-    level = noise_threshold(contributions.cube, pfa=contributions.cube.profile.processing.pfa, power=power)
-    return float(power[np.ix_(rows, columns)].max()), float(level[look.row, look.column])
+    level = contributions.threshold_of(number)[look.row, look.column]
+    return float(power[np.ix_(rows, columns)].max()), float(level)
 
 
 def _only_folded(contributions: Contributions, own: int, other: int, look: Look) -> bool:

@@ -7,14 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray
+from .._typing import FloatArray
 from ..config.profile import RadarProfile
 from ..constants import FOUR_PI_CUBED
 from ..dsp import RadarCube, window
-from ..dsp.spectra import range_spectrum
 from ..frames import spherical
 from ..scatterers import Weather
-from ..synthesis import AdcCube
 from .cells import Look
 from .contributions import Contributions
 from .records import Stage, Waterfall
@@ -90,16 +88,15 @@ def waterfall(
     into other cells; the last is measured on the object's own noise-free cube.
     """
     cube, profile = contributions.cube, contributions.cube.profile
-    samples = contributions.samples(object_id)
     own = contributions.of(object_id)
-    power = float(np.mean(np.abs(samples.data) ** 2))
+    power, ranges = contributions.levels(object_id)
     ledger = _Ledger()
     _link_stages(ledger, profile, link_of(profile, centre, cube.weather), power)
     received = ledger.level
     noise = profile.noise_power_w
     ledger.add("noise of a sample", -(db(noise) + 30), "dB", f"-k T F f_s, {db(noise) + 30:.1f} dBm")
     sample_snr = ledger.level
-    _processing_stages(ledger, cube, samples, own, look, power)
+    _processing_stages(ledger, cube, own, look, (power, float(ranges[look.row])))
     alone = ledger.level
     amplitude = look.beamformed(own)
     beside = sum((look.beamformed(contributions.of(i)) for i in others), 0.0 + 0.0j)
@@ -136,15 +133,14 @@ def _link_stages(ledger: _Ledger, profile: RadarProfile, link: Link, power: floa
 
 
 def _processing_stages(
-    ledger: _Ledger, cube: RadarCube, samples: AdcCube, own: RadarCube, look: Look, power: float
+    ledger: _Ledger, cube: RadarCube, own: RadarCube, look: Look, levels: tuple[float, float]
 ) -> None:
+    """Add the transforms; ``levels`` are the object's power in the samples, and in the cell's range bin [W]."""
     profile, w = cube.profile, cube.profile.waveform
     if profile.array.multiplex == "bpm":
         ledger.add("BPM decoding", db(profile.n_tx), "dB", f"{profile.n_tx} chirps averaged")
-    real = w.adc == "real"
-    ranges = range_spectrum(samples.data, name=cube.range_window, n_fft=cube.n_fft[0], real=real)
-    in_row = _mean_power(ranges[:, :, look.row])
-    in_cell = _mean_power(own.data[look.row, look.column])
+    power, in_row = levels
+    in_cell = float(own.range_doppler[look.row, look.column])
     in_beam = abs(look.beamformed(own)) ** 2
     for axis, name, count, before, after in (
         ("range", cube.range_window, w.samples, power, in_row),
@@ -156,10 +152,6 @@ def _processing_stages(
         ledger.add(f"{axis} spread and straddling", db(after / before), "dB", "what falls into other cells")
     ledger.add("array", db(profile.n_virtual), "dB", f"{profile.n_virtual} channels in phase")
     ledger.add("array mismatch", db(in_beam / in_cell), "dB", "other directions, folded TDM phase")
-
-
-def _mean_power(x: ComplexArray) -> float:
-    return float(np.mean(np.abs(x) ** 2))
 
 
 def _noise_bandwidth(name: str, count: int) -> float:
