@@ -30,7 +30,7 @@ LAYERS = (
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable",),
     ("runs",),
-    ("attribution",),  # reads run folders
+    ("attribution", "objects"),  # read run folders
     ("plot", "report"),
     ("comparison",),  # a comparison saves its figure page
     ("cli",),

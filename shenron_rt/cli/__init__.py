@@ -20,6 +20,7 @@ _VERBS = {
     "cast-lidar": ("cast:cast_lidar", "Cast a semantic LiDAR over a mesh scene and write CARLA's files."),
     "compare": ("compare:compare", "Compare two runs, or a run and a recording, and say what makes them differ."),
     "explain": ("explain:explain", "Tell for every object and frame of a run whether it is seen, and why not."),
+    "track": ("track:track", "Gather a run's detections to objects, track them, and compare with the truth."),
     "resolve": ("resolve:resolve", "Show which tag every part of a mesh gets, by which rule."),
     "validate": ("validate:validate", "Check YAML, mesh and ADC files and run folders."),
     "profiles": ("tables:profiles", "List the radar profiles, or show one with its derived numbers and sources."),

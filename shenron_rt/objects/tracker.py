@@ -44,8 +44,8 @@ class TrackerSettings:
     acceleration_std_mps2: float = 3.0
     speed_std_mps: float = 10.0
     gate_probability: float = 0.99
-    confirm_hits: int = 3
-    confirm_frames: int = 4
+    confirm_hits: int = 4
+    confirm_frames: int = 5
     max_misses: int = 5
 
     def __post_init__(self) -> None:
