@@ -62,7 +62,7 @@ def track_view(tracking: Tracking, observations: Sequence[Observation], *, title
     for axes in (upper, lower):
         axes.grid(color=GRID, lw=0.6)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(fontsize=8, ncols=4, frameon=False, loc="upper left")
+        axes.legend(fontsize=8, ncols=8, frameon=False, loc="upper left")
     figure.text(0.08, 0.955, title or "Tracks", fontsize=11, weight="bold", va="center")
     return figure
 
