@@ -249,14 +249,34 @@ def test_a_budget_that_misses_an_echo_does_not_close() -> None:
 
 
 # ---- labels, peaks
-def test_echoes_over_several_surfaces_are_labelled_ghosts() -> None:
-    profile = load_profile("awrl1432")
-    scene = two_points(profile, {}, {"xyz_m": (45, 0, 1), "rcs_dbsm": 15})
+def _with_bounces(object_id: int, second: dict[str, object]) -> srt.Frame:
+    """Return a frame of two points in which all echoes of one id but its nearest came over two surfaces."""
+    scene = two_points(load_profile("awrl1432"), {}, {"xyz_m": (45, 0, 1), "rcs_dbsm": 15} | second)
     frame = srt.simulate(scene)
-    returns = replace(frame.returns, bounces=np.where(frame.returns.object_id == 2, 2, 1).astype(np.uint8))
-    found = srt.explain(replace(frame, returns=returns), scene=scene).frames[0]
-    assert found.of(1).labels == ("direct",)
-    assert found.of(2).labels == ("ghost",)
+    ids = np.full(len(frame.returns), object_id, dtype=np.uint32)
+    bounces = np.where(frame.returns.object_id == 2, 2, 1).astype(np.uint8)
+    returns = replace(frame.returns, bounces=bounces, object_id=ids)
+    cube = replace(frame.cube, returns=returns)
+    return replace(frame, returns=returns, cube=cube, detections=srt.detect(cube))
+
+
+def test_an_echo_over_several_surfaces_away_from_its_object_is_a_ghost() -> None:
+    found = srt.explain(_with_bounces(7, {})).frames[0].of(7)
+    assert sorted(found.labels) == ["direct", "ghost"]
+    assert found.cell is not None
+    assert found.cell.range_m == pytest.approx(28, abs=0.4)  # the card shows the object, not its stronger ghost
+
+
+def test_a_corner_of_the_object_itself_is_no_ghost() -> None:
+    found = srt.explain(_with_bounces(7, {"xyz_m": (30.2, 0, 1)})).frames[0].of(7)
+    assert set(found.labels) == {"direct"}
+
+
+def test_an_object_seen_only_over_several_surfaces_is_told_so() -> None:
+    frame = _with_bounces(7, {})
+    returns = replace(frame.returns, bounces=np.full(len(frame.returns), 2, dtype=np.uint8))
+    found = srt.explain(replace(frame, returns=returns)).frames[0].of(7)
+    assert "only elsewhere" in found.verdict.text
 
 
 def test_a_folded_detection_is_labelled_with_its_verdict() -> None:
@@ -288,3 +308,36 @@ def test_released_counts_have_no_link_budget() -> None:
     frame = srt.simulate(made_scene(), model="shenron:as_released", **FAST)
     with pytest.raises(srt.InputError, match="not watts"):
         srt.explain(frame)
+
+
+# ---- every radar
+@pytest.mark.parametrize("name", ["awrl1432boost", "radarbook2", "ti_cascade"])
+def test_budgets_close_for_every_kind_of_array_and_converter(name: str) -> None:
+    """BPM and a real ADC, TDM with a folded target, 86 channels and three loops."""
+    profile = load_profile(name)
+    fast = 2 * profile.max_velocity_mps - 1
+    scene = two_points(
+        profile,
+        {"xyz_m": (32, 4, 2), "rcs_dbsm": 15, "velocity_mps": (-1, 0, 0)},
+        {"xyz_m": (22, -3, 1.5), "rcs_dbsm": 5, "velocity_mps": (fast, 0, 0)},
+    )
+    frame = srt.simulate(scene)
+    found = srt.explain(frame, scene=scene).frames[0]
+    for number, rcs_dbsm in ((1, 15), (2, 5)):
+        item = found.of(number)
+        assert item.waterfall is not None
+        assert item.waterfall.closes
+        assert item.waterfall.measured_snr_db == pytest.approx(frame.detections.snr_db[item.detections[0]], abs=1e-2)
+        gains = {s.name: s.gain_db for s in item.waterfall.stages}
+        # the radar equation holds at mid-frame for the array's reference: 1e-2 dB for apertures of metres in 20
+        assert gains["apparent cross section"] == pytest.approx(rcs_dbsm, abs=1e-2)
+    assert found.of(2).labels[0] == "direct, folded"
+
+
+def test_a_scene_without_objects_explains_nothing_and_has_no_peak_of_anyone() -> None:
+    scene = srt.Scene()
+    (frame,) = srt.explain(srt.simulate(scene), scene=scene)
+    assert frame.objects == ()
+    assert set(frame.detection_labels) <= {"noise"}
+    assert frame.strongest is not None
+    assert frame.strongest.name == "noise"

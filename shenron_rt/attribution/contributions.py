@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +26,9 @@ _NOTHING = 1e-4
 
 def some_returns(returns: Returns, rows: BoolArray | IntArray) -> Returns:
     """Return some of the echoes."""
-    columns = ("amplitude", "position", "velocity", "object_id", "tag", "coherent", "bounces", "scatterer")
-    picked = {name: getattr(returns, name)[rows] for name in columns}
-    departure = None if returns.departure is None else returns.departure[rows]
-    return replace(returns, **picked, departure=departure)
+    columns = {f.name: getattr(returns, f.name) for f in fields(returns)}
+    picked: dict[str, Any] = {name: v[rows] for name, v in columns.items() if isinstance(v, np.ndarray)}
+    return replace(returns, **picked)
 
 
 @dataclass

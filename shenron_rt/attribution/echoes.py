@@ -75,15 +75,15 @@ def detection_labels(cube: RadarCube, detections: Detections, returns: Returns) 
     Returns
     -------
     tuple of str
-        ``direct``, or ``ghost`` where echoes over several surfaces bring most of the power into its cell; with
-        ``folded`` where its velocity is known to be; ``noise`` where no echo accounts for it.
+        ``direct``, or ``ghost`` where echoes that show their object elsewhere bring most of the power into its cell;
+        with ``folded`` where its velocity is known to be; ``noise`` where no echo accounts for it.
     """
     looks = looks_of(cube, detections)
     row, column = (np.array([getattr(look, name) for look in looks], dtype=np.int64) for name in ("row", "column"))
     sine, elevation = (np.array([getattr(look, name) for look in looks]) for name in ("sine", "sine_elevation"))
-    several = returns.bounces > 1
+    ghost = _elsewhere(returns, cube.profile.range_resolution_m)
     power = [
-        attribute(cube, some_returns(returns, part), row, column, sine, elevation).power for part in (~several, several)
+        attribute(cube, some_returns(returns, part), row, column, sine, elevation).power for part in (~ghost, ghost)
     ]
     labels = []
     for i in range(len(detections)):
@@ -93,3 +93,19 @@ def detection_labels(cube: RadarCube, detections: Detections, returns: Returns) 
         label = "ghost" if power[1][i] > power[0][i] else "direct"
         labels.append(f"{label}, folded" if detections.ambiguous[i] else label)
     return tuple(labels)
+
+
+def _elsewhere(returns: Returns, cell_m: float) -> BoolArray:
+    """Tell which echoes over several surfaces show their object more than a cell from its first surfaces, (n,)."""
+    from scipy.spatial import cKDTree
+
+    several = returns.bounces > 1
+    ghost = several.copy()  # of an object without first surfaces nothing is where it is
+    for number in np.unique(returns.object_id[several]):
+        own = returns.object_id == number
+        surface = returns.position[own & ~several]
+        if len(surface):
+            rows = np.flatnonzero(own & several)
+            distance, _ = cKDTree(surface).query(returns.position[rows])
+            ghost[rows] = np.asarray(distance) > cell_m
+    return ghost

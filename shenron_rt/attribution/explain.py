@@ -183,8 +183,9 @@ class _View:
 
     def _look(self, number: int, detections: tuple[int, ...]) -> Look | None:
         """Return the cell of the strongest detection, else that of the object's own peak."""
-        if detections:
-            return self.looks[detections[0]]
+        direct = [i for i in detections if not self.labels[i].startswith("ghost")]
+        if direct or detections:
+            return self.looks[(direct or list(detections))[0]]
         own = self.contributions.of(number)
         return look_at_peak(own, self.judge.first_row) or look_at_peak(own)
 

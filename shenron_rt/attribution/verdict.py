@@ -101,6 +101,8 @@ class Judge:
     def _detected(self, labels: tuple[str, ...]) -> Verdict:
         kinds = sorted(set(labels))
         text = f"detected ({', '.join(kinds)})" if kinds != ["direct"] else "detected"
+        if all(kind.startswith("ghost") for kind in kinds):
+            text = f"detected only elsewhere, over several surfaces ({', '.join(kinds)})"
         return Verdict("detected", text, {"detections": len(labels)})
 
     def _blanked(self) -> Verdict:

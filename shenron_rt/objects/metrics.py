@@ -106,7 +106,7 @@ def identity_metrics(truths: Sequence[Places], tracks: Sequence[Places], *, gate
 
     Notes
     -----
-    CLEAR metrics: a pair that matched in the frame before stays matched while it is within the gate; the rest is assigned
+    CLEAR metrics: a pair that matched in the frame before stays matched while within the gate; the rest is assigned
     at least total distance. IDF1 assigns identities once for all frames.
 
     References
