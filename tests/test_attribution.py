@@ -12,6 +12,7 @@ from explain_tools import two_points
 
 import shenron_rt as srt
 from shenron_rt.attribution import Contributions, Explanation
+from shenron_rt.attribution.cells import strongest_beam
 from shenron_rt.config.profile import load_profile
 
 
@@ -314,7 +315,7 @@ def test_released_counts_have_no_link_budget() -> None:
 @pytest.mark.parametrize("name", ["awrl1432boost", "radarbook2", "ti_cascade"])
 def test_budgets_close_for_every_kind_of_array_and_converter(name: str) -> None:
     """BPM and a real ADC, TDM with a folded target, 86 channels and three loops."""
-    profile = load_profile(name)
+    profile = load_profile(name, {} if name == "ti_cascade" else {"waveform.chirps": 32})
     fast = 2 * profile.max_velocity_mps - 1
     scene = two_points(
         profile,
@@ -341,3 +342,16 @@ def test_a_scene_without_objects_explains_nothing_and_has_no_peak_of_anyone() ->
     assert set(frame.detection_labels) <= {"noise"}
     assert frame.strongest is not None
     assert frame.strongest.name == "noise"
+
+
+def test_the_search_for_the_strongest_beam_finds_the_maximum_of_the_map() -> None:
+    cube = srt.process(srt.synthesize(srt.simulate(srt.Scene()).returns, load_profile("awrl1432"), seed=9))
+    for first_row in (0, 200):
+        found = strongest_beam(cube, first_row)  # of noise alone nearly every cell must be tried
+        assert found is not None
+        look, azimuth_deg, power = found
+        part = cube.range_azimuth[first_row:]
+        row, beam = np.unravel_index(int(part.argmax()), part.shape)
+        assert power == pytest.approx(part.max(), rel=1e-12)
+        assert look.row == row + first_row
+        assert azimuth_deg == pytest.approx(np.degrees(cube.azimuth_rad[beam]))

@@ -10,14 +10,16 @@ import numpy as np
 from .._typing import ComplexArray, FloatArray
 from ..constants import SPEED_OF_LIGHT
 from ..dsp import RadarCube
-from ..dsp.angle import bartlett, has_elevation, refine_peak
+from ..dsp.angle import bartlett, has_elevation, refine_peak, steering
 from ..dsp.elements import Elements
 from .records import Cell
 
-__all__ = ["Look", "look_at_detection", "look_at_peak"]
+__all__ = ["Look", "look_at_detection", "look_at_peak", "strongest_beam"]
 
 #: Elevation beams tried, across the visible sines.
 _ELEVATION_BEAMS = 65
+#: Cells beamformed together in the search for the strongest.
+_CELLS_AT_ONCE = 1024
 #: Passes over azimuth and elevation in turn.
 _PASSES = 2
 
@@ -158,3 +160,31 @@ def _best(snapshot: ComplexArray, vectors: ComplexArray, tried: FloatArray) -> f
     index = np.asarray(int(power.argmax()))
     step = float(tried[1] - tried[0]) if len(tried) > 1 else 0.0
     return float(np.clip(tried[index] + step * float(refine_peak(power, index)), -1.0, 1.0))
+
+
+def strongest_beam(cube: RadarCube, first_row: int = 0) -> tuple[Look, float, float] | None:
+    """Return cell, azimuth [deg] and power [W] of the maximum of ``cube.range_azimuth`` from a row on.
+
+    The mean power of the channels bounds that of any beam, so that cells in falling order of it are beamformed only
+    until no cell left can be stronger.
+    """
+    p, channels = cube.profile, cube.azimuth_channels
+    data = cube.data[first_row:][:, :, channels].reshape(-1, len(channels))
+    bound = np.mean(data.real**2 + data.imag**2, axis=1)
+    if not bound.max(initial=0.0) > 0:
+        return None
+    vectors = steering(p.positions_m[channels], p.wavelength_m, cube.azimuth_sine)
+    order = np.argsort(-bound, kind="stable")
+    best, cell, beam = 0.0, 0, 0
+    for start in range(0, len(order), _CELLS_AT_ONCE):
+        some = order[start : start + _CELLS_AT_ONCE]
+        if bound[some[0]] <= best:
+            break
+        power = bartlett(data[some], vectors)
+        i, j = np.unravel_index(int(power.argmax()), power.shape)
+        if power[i, j] > best:
+            best, cell, beam = float(power[i, j]), int(some[i]), int(j)
+    row, column = divmod(cell, cube.data.shape[1])
+    row += first_row
+    look = Look(cube, row, column, row * cube.range_step_m, 0.0, float(cube.azimuth_sine[beam]), 0.0)
+    return look, float(np.degrees(cube.azimuth_rad[beam])), best

@@ -13,7 +13,7 @@ from ..config.scene import Scene
 from ..dsp import noise_threshold
 from ..errors import InputError
 from ..tags import SemanticTag
-from .cells import Look, look_at_peak
+from .cells import Look, look_at_peak, strongest_beam
 from .contributions import Contributions
 from .echoes import Middle, detection_labels, looks_of, middle_of
 from .masking import shares
@@ -168,18 +168,14 @@ class _View:
     def strongest(self) -> Peak | None:
         """Return the strongest cell of the range-azimuth map beyond blanking."""
         cube = self.case.cube
-        power = cube.range_azimuth[self.judge.first_row :]
-        if not power.max(initial=0.0) > 0:
+        found = strongest_beam(cube, self.judge.first_row)
+        if found is None:
             return None
-        i, j = (int(v) for v in np.unravel_index(int(power.argmax()), power.shape))
-        row, sine = i + self.judge.first_row, float(cube.azimuth_sine[j])
-        columns = [Look(cube, row, c, row * cube.range_step_m, 0.0, sine, 0.0) for c in range(cube.data.shape[1])]
-        look = max(columns, key=lambda at: abs(at.beamformed(cube)))
+        look, azimuth, power = found
         levels = {i: abs(look.beamformed(self.contributions.of(i))) for i in self.power_w}
         best = max(levels, key=lambda i: levels[i], default=-1)
         name = "noise" if best < 0 else self.case.names.get(best, f"object {best}" if best else "static")
-        azimuth = float(np.degrees(cube.azimuth_rad[j]))
-        return Peak(float(cube.range_m[row]), azimuth, db(float(power[i, j])) + 30, best, name)
+        return Peak(float(cube.range_m[look.row]), azimuth, db(power) + 30, best, name)
 
     def _look(self, number: int, detections: tuple[int, ...]) -> Look | None:
         """Return the cell of the strongest detection, else that of the object's own peak."""
