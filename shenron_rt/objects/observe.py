@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._typing import BoolArray, FloatArray
+from ..config.materials import load_materials
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
 from ..dsp import Detections, RadarCube
 from ..returns import Returns
-from ..scene.motion import BodyState, body_state
+from ..scene.motion import BodyState
+from ..scene.world import build_world
 from .clusters import Clusters, ClusterSettings, cluster
 from .tracker import Measurement, TrackerSettings
 
@@ -58,9 +60,8 @@ class Observation:
 
 
 def radar_state(scene: Scene, radar: str, time_s: float) -> BodyState:
-    """Return a radar's pose and motion in the world at a time [s]."""
-    ego = body_state(scene.ego.pose, scene.ego.velocity_mps, scene.ego.yaw_rate_deg_s, time_s)
-    return ego.mounted(scene.radar(radar).pose)
+    """Return a radar's pose and motion in the world at a time [s], as the tracer has them."""
+    return build_world(scene, scene.radar(radar), time_s, (), load_materials(scene.materials)).radar_state
 
 
 def truths_of(returns: Returns, cube: RadarCube, radar: BodyState, ids: Iterable[int]) -> dict[int, Truth]:
