@@ -355,3 +355,34 @@ def test_the_search_for_the_strongest_beam_finds_the_maximum_of_the_map() -> Non
         assert power == pytest.approx(part.max(), rel=1e-12)
         assert look.row == row + first_row
         assert azimuth_deg == pytest.approx(np.degrees(cube.azimuth_rad[beam]))
+
+
+def test_what_is_wholly_hidden_is_occluded_even_where_it_would_be_too_weak_alone() -> None:
+    wall = {"name": "wall", "shape": "wall:8x3", "xyz_m": (15, 0, 0), "ypr_deg": (90, 0, 0), "tag": "Walls"}
+    person = {"id": 3, "name": "person", "shape": "pedestrian", "xyz_m": (45, 0, 0), "aim": 1000}
+    scene = srt.Scene(static=[wall | {"material": "concrete"}], actors=[person], radars=[{"xyz_m": (2, 0, 1)}])
+    found = srt.explain(srt.simulate(scene, **FAST), scene=scene).frames[0].of(3).verdict
+    assert (found.name, found.by) == ("occluded", "wall")
+    assert found.numbers["margin_alone_db"] < 0
+    assert "take wall away, and find" in found.change
+
+
+@pytest.mark.parametrize(
+    ("shape", "xyz_m", "yaw_deg", "verdict"),
+    [
+        # 0.36 m^2 turned by 35 deg at 38 m: 5 dB short as an isotropic surface, and by far enough facing
+        ("plate:0.6x0.6", (40, 0, 1), 215, "specular away"),
+        # a ball mirrors from wherever it is seen: nothing to turn
+        ("sphere:r=0.05", (80, 0, 1), 0, "below noise"),
+        # two centimetres square at 80 m face the radar, and are too small
+        ("plate:0.02x0.02", (80, 0, 1), 180, "below noise"),
+    ],
+)
+def test_turning_away_is_told_from_being_small(
+    shape: str, xyz_m: tuple[float, float, float], yaw_deg: float, verdict: str
+) -> None:
+    thing = {"id": 3, "name": "thing", "shape": shape, "xyz_m": xyz_m, "ypr_deg": (yaw_deg, 0, 0)}
+    scene = srt.Scene(
+        actors=[thing | {"material": "metal", "tag": "Other", "aim": 2000}], radars=[{"xyz_m": (2, 0, 1)}]
+    )
+    assert srt.explain(srt.simulate(scene, **FAST), scene=scene).frames[0].of(3).verdict.name == verdict

@@ -21,6 +21,8 @@ __all__ = ["Blockers", "Unhidden", "isotropic", "unhidden"]
 
 #: Rays at an object that is looked at alone, and over the whole sphere where it surrounds the radar.
 _AIM, _RAYS = 20_000, 20_000
+#: A flat piece with less of an object's surface is a facet of something curved.
+_FACET = 0.1
 #: What stands less than this before a point is the point's own surface [m].
 _SLACK_M = 0.02
 
@@ -76,6 +78,22 @@ class Unhidden:
         if not weight.sum() > 0:
             weight = np.ones(len(rows))
         return np.asarray(np.average(rows.position, axis=0, weights=weight), dtype=np.float64)
+
+    def facing_m2(self, wavelength_m: float) -> float:
+        """Return what the largest flat piece would mirror if it faced the radar and were metal [m^2].
+
+        Notes
+        -----
+        The smaller of 4 pi A^2 / lambda^2 and, once the plate is wider than a Fresnel zone, pi R^2. A piece smaller
+        than a tenth of the surface is a facet of a curved one, and counts for nothing.
+        """
+        rows = self.scatterers
+        if rows.patch is None or not self.area_m2 > 0:
+            return 0.0
+        flat = float(rows.patch.max())
+        if flat < _FACET * self.area_m2:
+            return 0.0
+        return min(4 * np.pi * flat**2 / wavelength_m**2, np.pi * float(self.centre @ self.centre))
 
     def turn_deg(self) -> float | None:
         """Return the smallest angle by which a tenth of the projected area misses facing the radar [deg]."""

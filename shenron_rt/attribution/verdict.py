@@ -23,8 +23,12 @@ __all__ = ["Judge"]
 
 #: Less of an object hidden, or a pattern less below its axis [dB, both ways], is no cause.
 _HIDDEN, _PATTERN_DB = 0.1, -3.0
+#: Hidden by more than this, and met by no ray, an object is occluded whatever else it lacks.
+_MOSTLY = 0.5
 #: Apparent cross section this far below the projected area is the mirror's doing [dB].
-_MIRROR_DB = 10.0
+_MIRROR_DB = 6.0
+#: An isotropic surface of the area may stand this far below the threshold where a face turned here would not [dB].
+_NEARLY_DB = 10.0
 
 
 @dataclass(frozen=True)
@@ -152,13 +156,16 @@ class Judge:
             "projected_area_m2": view.projected_m2,
             "apparent_rcs_dbsm": apparent,
         }
+        facing = link.unit_dbm + db(view.facing_m2(p.wavelength_m)) - self._threshold_dbm(link)
+        numbers["margin_facing_db"] = facing
+        mirrored = max(isotropic, facing) if isotropic >= -_NEARLY_DB else isotropic
         mirror_db = db(view.projected_m2) - apparent if view.projected_m2 > 0 else -math.inf
         causes = {
             "occluded": (alone - now if view.blockers.hidden_share >= _HIDDEN else -math.inf, alone),
             "outside the beam": (-link.pattern_db if link.pattern_db <= _PATTERN_DB else -math.inf, axis),
-            "specular away": (mirror_db if mirror_db >= _MIRROR_DB else -math.inf, isotropic),
+            "specular away": (mirror_db if mirror_db >= _MIRROR_DB else -math.inf, mirrored),
         }
-        chosen = self._choose(causes, now, view, alone, isotropic - link.pattern_db)
+        chosen = self._choose(causes, now, view, alone, mirrored - link.pattern_db)
         if chosen == "occluded":
             text = f"occluded by {by}: {view.blockers.by[0][1]:.0%} of its surface lies behind it"
             return Verdict("occluded", text, numbers, _without(by, alone), by)
@@ -182,11 +189,11 @@ class Judge:
         causes: dict[str, tuple[float, float]], now: float, view: Unhidden, alone: float, everything: float
     ) -> str:
         """Return the cause whose removal suffices, upstream first; else the largest of several that do together."""
+        if view.blockers.hidden_share > _MOSTLY and not math.isfinite(now):
+            return "occluded"  # nothing of it was met; whatever else it lacks comes after
         for name, (loss, margin) in causes.items():
             if loss > 0 and margin >= 0:
                 return name
-        if view.blockers.hidden_share > 0.5 and not math.isfinite(now):
-            return "occluded"
         losses = {name: loss for name, (loss, _) in causes.items() if loss > 0 and name != "occluded"}
         if losses and everything >= 0 > alone:
             return max(losses, key=lambda name: losses[name])
@@ -200,12 +207,14 @@ class Judge:
         samples = synthesize(returns, self.case.cube.profile, noise=None, accuracy=self.contributions.accuracy)
         return self.margin_db(self.contributions.processed(samples))
 
+    def _threshold_dbm(self, link: Link) -> float:
+        """Return the threshold that noise alone sets at a range [dBm]."""
+        row = int(np.clip(round(link.distance_m / self.case.cube.range_step_m), 0, len(self.noise_threshold_w) - 1))
+        return db(float(self.noise_threshold_w[row, 0])) + 30
+
     def _isotropic(self, view: Unhidden, link: Link) -> tuple[float, float]:
         """Return the margin of an isotropic scatterer of the projected area, and the apparent cross section [dBsm]."""
-        cube = self.case.cube
-        row = int(np.clip(round(link.distance_m / cube.range_step_m), 0, len(self.noise_threshold_w) - 1))
-        level = db(float(self.noise_threshold_w[row, 0])) + 30
-        margin = link.unit_dbm + db(view.projected_m2) - level
+        margin = link.unit_dbm + db(view.projected_m2) - self._threshold_dbm(link)
         power = db(sum(view.returns.power_by_object().values())) + 30 if len(view.returns) else -math.inf
         return margin, power - link.unit_dbm
 
