@@ -13,6 +13,8 @@ from explain_tools import two_points
 import shenron_rt as srt
 from shenron_rt.attribution import Contributions, Explanation
 from shenron_rt.attribution.cells import strongest_beam
+from shenron_rt.attribution.contributions import GHOST
+from shenron_rt.chains import Chains
 from shenron_rt.config.profile import load_profile
 
 
@@ -250,34 +252,46 @@ def test_a_budget_that_misses_an_echo_does_not_close() -> None:
 
 
 # ---- labels, peaks
-def _with_bounces(object_id: int, second: dict[str, object]) -> srt.Frame:
-    """Return a frame of two points in which all echoes of one id but its nearest came over two surfaces."""
-    scene = two_points(load_profile("awrl1432"), {}, {"xyz_m": (45, 0, 1), "rcs_dbsm": 15} | second)
+def _with_a_ghost(*, all_of_it: bool = False) -> srt.Frame:
+    """Return a frame of two points of one id, of which the farther, or both, came by way of object 40."""
+    scene = two_points(load_profile("awrl1432"), {}, {"xyz_m": (45, 0, 1), "rcs_dbsm": 15})
     frame = srt.simulate(scene)
-    ids = np.full(len(frame.returns), object_id, dtype=np.uint32)
-    bounces = np.where(frame.returns.object_id == 2, 2, 1).astype(np.uint8)
-    returns = replace(frame.returns, bounces=bounces, object_id=ids)
+    ghost = (frame.returns.object_id == 2) | all_of_it
+    returns = replace(
+        frame.returns,
+        object_id=np.full(2, 7, dtype=np.uint32),
+        bounces=np.where(ghost, 2, 1).astype(np.uint8),
+        chains=Chains(np.array([[7, -1], [40, 7]]), ghost.astype(np.int32), ghost),
+    )
     cube = replace(frame.cube, returns=returns)
     return replace(frame, returns=returns, cube=cube, detections=srt.detect(cube))
 
 
-def test_an_echo_over_several_surfaces_away_from_its_object_is_a_ghost() -> None:
-    found = srt.explain(_with_bounces(7, {})).frames[0].of(7)
-    assert sorted(found.labels) == ["direct", "ghost"]
+def test_a_ghost_is_labelled_with_its_chain_and_is_a_part_of_its_own() -> None:
+    found = srt.explain(_with_a_ghost()).frames[0].of(7)
+    assert sorted(found.labels) == ["direct", "ghost 40>7"]
+    assert found.verdict.name == "detected"
     assert found.cell is not None
     assert found.cell.range_m == pytest.approx(28, abs=0.4)  # the card shows the object, not its stronger ghost
+    assert "ghost of object 7" in {s.name for s in found.shares}
+    # and its power is its own: 0 dBsm at 28 m
+    assert found.waterfall is not None
+    assert {s.name: s.gain_db for s in found.waterfall.stages}["apparent cross section"] == pytest.approx(0, abs=0.01)
 
 
-def test_a_corner_of_the_object_itself_is_no_ghost() -> None:
-    found = srt.explain(_with_bounces(7, {"xyz_m": (30.2, 0, 1)})).frames[0].of(7)
-    assert set(found.labels) == {"direct"}
+def test_an_object_seen_only_as_its_ghost_is_not_detected() -> None:
+    found = srt.explain(_with_a_ghost(all_of_it=True)).frames[0].of(7)
+    assert found.verdict.name != "detected"
+    assert "seen only elsewhere, as ghost 40>7" in found.verdict.text
 
 
-def test_an_object_seen_only_over_several_surfaces_is_told_so() -> None:
-    frame = _with_bounces(7, {})
-    returns = replace(frame.returns, bounces=np.full(len(frame.returns), 2, dtype=np.uint8))
-    found = srt.explain(replace(frame, returns=returns)).frames[0].of(7)
-    assert "only elsewhere" in found.verdict.text
+def test_parts_of_a_frame_with_bounces_add_up_to_its_cube() -> None:
+    frame = srt.simulate(srt.load_scene("braking"), rays=5000, accuracy=1e-3, max_bounces=3)
+    parts = Contributions(frame.returns, frame.cube, accuracy=1e-8)
+    assert max(parts.ids) > GHOST  # the car is seen in the walls, too
+    whole = srt.synthesize(frame.returns, frame.profile, noise=None, accuracy=1e-8)
+    total = sum(parts.samples(i).data for i in parts.ids)
+    assert np.sqrt(np.mean(np.abs(total - whole.data) ** 2)) < 1e-6 * np.sqrt(np.mean(np.abs(whole.data) ** 2))
 
 
 def test_a_folded_detection_is_labelled_with_its_verdict() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,14 @@ from ..dsp.spectra import range_spectrum
 from ..returns import Returns
 from ..synthesis import AdcCube, synthesize
 
-__all__ = ["Contributions", "some_returns"]
+__all__ = ["GHOST", "Contributions", "some_returns"]
 
 #: Cubes of objects that are kept rather than made again [bytes].
 _KEEP_BYTES = 512 << 20
 #: RMS error of an object's samples relative to their own RMS.
 ACCURACY = 1e-6
+#: Added to an object's id: its echoes that show it where it is not. They are a part of their own.
+GHOST = 1 << 32
 #: Echoes whose amplitudes, all in phase, stay this far below the noise of a beamformed cell leave nothing to tell.
 _NOTHING = 1e-4
 
@@ -28,12 +31,14 @@ def some_returns(returns: Returns, rows: BoolArray | IntArray) -> Returns:
     """Return some of the echoes."""
     columns = {f.name: getattr(returns, f.name) for f in fields(returns)}
     picked: dict[str, Any] = {name: v[rows] for name, v in columns.items() if isinstance(v, np.ndarray)}
+    if returns.chains is not None:
+        picked["chains"] = replace(returns.chains, row=returns.chains.row[rows], ghost=returns.chains.ghost[rows])
     return replace(returns, **picked)
 
 
 @dataclass
 class Contributions:
-    """The noise-free samples and cubes of each object alone.
+    """The noise-free samples and cubes of each part alone: an object, or, at its id + ``GHOST``, its ghosts.
 
     Parameters
     ----------
@@ -53,18 +58,23 @@ class Contributions:
     _levels: dict[int, tuple[float, FloatArray]] = field(default_factory=dict, repr=False)
     _thresholds: dict[int, FloatArray] = field(default_factory=dict, repr=False)
 
-    @property
+    @cached_property
+    def part(self) -> IntArray:
+        """(n,) int64, the part that each echo belongs to."""
+        return self.returns.object_id.astype(np.int64) + GHOST * self.returns.ghost
+
+    @cached_property
     def ids(self) -> list[int]:
-        """Objects with echoes, ascending."""
-        return [int(i) for i in np.unique(self.returns.object_id)]
+        """Parts with echoes, ascending."""
+        return [int(i) for i in np.unique(self.part)]
 
     def returns_of(self, object_id: int) -> Returns:
         """Return the echoes of one object."""
-        return some_returns(self.returns, self.returns.object_id == object_id)
+        return some_returns(self.returns, self.part == object_id)
 
     def negligible(self, object_id: int) -> bool:
         """Tell whether the object's echoes could never be told from nothing, even all in phase."""
-        most = float(np.abs(self.returns.amplitude[self.returns.object_id == object_id]).sum()) ** 2
+        most = float(np.abs(self.returns.amplitude[self.part == object_id]).sum()) ** 2
         return most <= _NOTHING * self.cube.noise_power_w / self.cube.profile.n_virtual
 
     def samples(self, object_id: int) -> AdcCube:
@@ -118,7 +128,7 @@ class Contributions:
         data = self.cube.data.copy()
         for number in object_ids:
             data -= self.of(number).data
-        left = some_returns(self.returns, ~np.isin(self.returns.object_id, object_ids))
+        left = some_returns(self.returns, ~np.isin(self.part, object_ids))
         return replace(self.cube, data=data, returns=left)
 
     def map_of(self, object_id: int) -> FloatArray:

@@ -9,10 +9,8 @@ import numpy as np
 from .._typing import BoolArray, FloatArray
 from ..constants import SPEED_OF_LIGHT
 from ..dsp import Detections, RadarCube
-from ..dsp.truth import attribute
 from ..returns import Returns
 from .cells import Look, look_at_detection
-from .contributions import some_returns
 
 __all__ = ["MAIN_LOBE_BINS", "Middle", "detection_labels", "looks_of", "middle_of", "near_cell"]
 
@@ -69,43 +67,20 @@ def looks_of(cube: RadarCube, detections: Detections) -> list[Look]:
     ]
 
 
-def detection_labels(cube: RadarCube, detections: Detections, returns: Returns) -> tuple[str, ...]:
+def detection_labels(detections: Detections) -> tuple[str, ...]:
     """Return what each detection is.
 
     Returns
     -------
     tuple of str
-        ``direct``, or ``ghost`` where echoes that show their object elsewhere bring most of the power into its cell;
-        with ``folded`` where its velocity is known to be; ``noise`` where no echo accounts for it.
+        ``direct``, or ``ghost`` with its chain of objects where the echoes show their object elsewhere; with ``folded``
+        where its velocity is known to be; ``noise`` where no echo accounts for it.
     """
-    looks = looks_of(cube, detections)
-    row, column = (np.array([getattr(look, name) for look in looks], dtype=np.int64) for name in ("row", "column"))
-    sine, elevation = (np.array([getattr(look, name) for look in looks]) for name in ("sine", "sine_elevation"))
-    ghost = _elsewhere(returns, cube.profile.range_resolution_m)
-    power = [
-        attribute(cube, some_returns(returns, part), row, column, sine, elevation).power for part in (~ghost, ghost)
-    ]
     labels = []
     for i in range(len(detections)):
         if detections.object_id[i] < 0:
             labels.append("noise")
             continue
-        label = "ghost" if power[1][i] > power[0][i] else "direct"
+        label = f"ghost {detections.chain[i]}" if detections.ghost[i] else "direct"
         labels.append(f"{label}, folded" if detections.ambiguous[i] else label)
     return tuple(labels)
-
-
-def _elsewhere(returns: Returns, cell_m: float) -> BoolArray:
-    """Tell which echoes over several surfaces show their object more than a cell from its first surfaces, (n,)."""
-    from scipy.spatial import cKDTree
-
-    several = returns.bounces > 1
-    ghost = several.copy()  # of an object without first surfaces nothing is where it is
-    for number in np.unique(returns.object_id[several]):
-        own = returns.object_id == number
-        surface = returns.position[own & ~several]
-        if len(surface):
-            rows = np.flatnonzero(own & several)
-            distance, _ = cKDTree(surface).query(returns.position[rows])
-            ghost[rows] = np.asarray(distance) > cell_m
-    return ghost

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..dsp import noise_threshold
 from ..errors import InputError
 from ..tags import SemanticTag
 from .cells import Look, look_at_peak, strongest_beam
-from .contributions import Contributions
+from .contributions import GHOST, Contributions
 from .echoes import Middle, detection_labels, looks_of, middle_of
 from .masking import shares
 from .records import FrameExplanation, ObjectExplanation, Peak
@@ -117,14 +117,17 @@ def explain(
 def _explain_frame(case: Case, wanted: int | None) -> FrameExplanation:
     contributions = Contributions(case.returns, case.cube)
     judge = Judge.of(case, contributions)
-    labels = detection_labels(case.cube, case.detections, case.returns)
+    labels = detection_labels(case.detections)
     looks = looks_of(case.cube, case.detections)
-    echoing = case.returns.power_by_object()
-    ids = sorted(set(echoing) | {i for i in case.names if i}, key=lambda i: -echoing.get(i, 0.0))
+    echoing = {i: sum(contributions.returns_of(i).power_by_object().values()) for i in contributions.ids}
+    known = {i % GHOST for i in echoing} | {i for i in case.names if i}
+    ids = sorted(known, key=lambda i: -echoing.get(i, 0.0))
+    names = {i: case.names.get(i, f"object {i}" if i else "static") for i in known}
+    case = replace(case, names=names | {i + GHOST: f"ghost of {name}" for i, name in names.items()})
     if wanted is not None:
         if wanted not in ids:
-            known = ", ".join(f"{i} ({case.names.get(i, 'unnamed')})" for i in sorted(ids))
-            raise InputError(f"explain: no object {wanted} in frame {case.frame}; there are {known or 'none'}")
+            listed = ", ".join(f"{i} ({names[i]})" for i in sorted(ids))
+            raise InputError(f"explain: no object {wanted} in frame {case.frame}; there are {listed or 'none'}")
         ids = [wanted]
     view = _View(case, contributions, judge, labels, looks, echoing)
     objects = tuple(view.explained(i) for i in ids)
@@ -155,7 +158,7 @@ class _View:
         verdict = self.judge.verdict(number, look, others, labels)
         return ObjectExplanation(
             object_id=number,
-            name=case.names.get(number, f"object {number}" if number else "static"),
+            name=case.names[number],
             detections=mine,
             labels=labels,
             power_dbm=db(self.power_w[number]) + 30 if self.power_w.get(number, 0.0) > 0 else None,
@@ -174,14 +177,14 @@ class _View:
         look, azimuth, power = found
         levels = {i: abs(look.beamformed(self.contributions.of(i))) for i in self.power_w}
         best = max(levels, key=lambda i: levels[i], default=-1)
-        name = "noise" if best < 0 else self.case.names.get(best, f"object {best}" if best else "static")
-        return Peak(float(cube.range_m[look.row]), azimuth, db(power) + 30, best, name)
+        name = "noise" if best < 0 else self.case.names[best]
+        return Peak(float(cube.range_m[look.row]), azimuth, db(power) + 30, best % GHOST if best >= 0 else -1, name)
 
     def _look(self, number: int, detections: tuple[int, ...]) -> Look | None:
         """Return the cell of the strongest detection, else that of the object's own peak."""
         direct = [i for i in detections if not self.labels[i].startswith("ghost")]
-        if direct or detections:
-            return self.looks[(direct or list(detections))[0]]
+        if direct:
+            return self.looks[direct[0]]
         own = self.contributions.of(number)
         return look_at_peak(own, self.judge.first_row) or look_at_peak(own)
 

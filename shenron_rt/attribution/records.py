@@ -141,11 +141,11 @@ class ObjectExplanation:
     range_m, azimuth_deg, elevation_deg, velocity_mps : float or None
         Where it is: mean over its echoes by power, else over its unhidden surface by area.
     power_dbm : float or None
-        ``Returns.power_by_object``: received power at mid-frame.
+        Received power at mid-frame, as ``Returns.power_by_object``, of the echoes that show the object where it is.
     detections : tuple of int
         Rows of the frame's detections that are its.
     labels : tuple of str
-        Of those: ``direct``, ``ghost``, ``folded``.
+        Of those: ``direct``, ``ghost`` with its chain of objects, ``folded``.
     cell, threshold_dbm, noise_threshold_dbm, cell_dbm
         The cell, the CFAR threshold there, the one that noise alone would set, the measured power, channel mean.
     shares : tuple of Share

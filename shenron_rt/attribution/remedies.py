@@ -27,10 +27,10 @@ _SAMPLED, _SPARE = 0.9, 1.05
 
 
 def found_in(cube: RadarCube, object_id: int, cfar: str = "ca") -> bool:
-    """Tell whether detection with the profile's settings finds the object in a cube."""
+    """Tell whether detection with the profile's settings finds the object in a cube, where it is."""
     settings = cube.profile.processing
     found = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m, cfar=cfar)
-    return bool(np.any(found.object_id == object_id))
+    return bool(np.any((found.object_id == object_id) & ~found.ghost))
 
 
 def process_remedy(case: Case, object_id: int) -> str:

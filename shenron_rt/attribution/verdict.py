@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -77,8 +77,15 @@ class Judge:
         labels : tuple of str
             Of its detections, if any.
         """
-        if labels:
+        if any(not label.startswith("ghost") for label in labels):
             return self._detected(labels)
+        found = self._unseen(object_id, look, others)
+        if labels:
+            kinds = ", ".join(sorted(set(labels)))
+            found = replace(found, text=f"{found.text}; seen only elsewhere, as {kinds}")
+        return found
+
+    def _unseen(self, object_id: int, look: Look | None, others: list[int]) -> Verdict:
         margin = -math.inf
         if look is not None:
             own = self.contributions.of(object_id)
@@ -105,8 +112,6 @@ class Judge:
     def _detected(self, labels: tuple[str, ...]) -> Verdict:
         kinds = sorted(set(labels))
         text = f"detected ({', '.join(kinds)})" if kinds != ["direct"] else "detected"
-        if all(kind.startswith("ghost") for kind in kinds):
-            text = f"detected only elsewhere, over several surfaces ({', '.join(kinds)})"
         return Verdict("detected", text, {"detections": len(labels)})
 
     def _blanked(self) -> Verdict:

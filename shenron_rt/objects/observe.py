@@ -70,7 +70,7 @@ def truths_of(returns: Returns, cube: RadarCube, radar: BodyState, ids: Iterable
     power = returns.power_by_object()
     found = {}
     for number in ids:
-        mine = returns.object_id == number
+        mine = (returns.object_id == number) & ~returns.ghost
         weight = np.abs(returns.amplitude[mine]) ** 2
         if not weight.sum() > 0:
             continue
