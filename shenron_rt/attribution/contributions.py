@@ -68,6 +68,11 @@ class Contributions:
         """Parts with echoes, ascending."""
         return [int(i) for i in np.unique(self.part)]
 
+    @cached_property
+    def whole(self) -> RadarCube:
+        """The noise-free cube of all parts together."""
+        return self.processed(self._synthesized(self.returns))
+
     def returns_of(self, object_id: int) -> Returns:
         """Return the echoes of one object."""
         return some_returns(self.returns, self.part == object_id)
@@ -79,9 +84,12 @@ class Contributions:
 
     def samples(self, object_id: int) -> AdcCube:
         """Return the noise-free samples of one object; an ideal receiver, without the steps of its ADC."""
+        return self._synthesized(self.returns_of(object_id))
+
+    def _synthesized(self, returns: Returns) -> AdcCube:
         receiver = self.cube.profile.receiver.model_copy(update={"adc_bits": None, "full_scale_dbm": None})
         profile = self.cube.profile.model_copy(update={"receiver": receiver})
-        return synthesize(self.returns_of(object_id), profile, noise=None, accuracy=self.accuracy)
+        return synthesize(returns, profile, noise=None, accuracy=self.accuracy)
 
     def processed(self, samples: AdcCube) -> RadarCube:
         """Return the cube of some samples, transformed as the frame's own was."""
@@ -122,6 +130,11 @@ class Contributions:
         if object_id not in self._levels:
             self.of(object_id)
         return self._levels[object_id]
+
+    def alone(self, object_id: int) -> RadarCube:
+        """Return the frame's own cube, noise included, with all parts taken out but one."""
+        data = self.cube.data - self.whole.data + self.of(object_id).data
+        return replace(self.cube, data=data, returns=self.returns_of(object_id))
 
     def without(self, object_ids: list[int]) -> RadarCube:
         """Return the frame's own cube, noise included, with some objects taken out."""

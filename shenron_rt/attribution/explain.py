@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from ..runs import Run
 
 __all__ = ["Explanation", "explain"]
+
+#: Parts whose share is told in every cell: of ten thousand objects the strongest.
+_MOST_PARTS = 100
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,12 @@ class _View:
     looks: list[Look]
     power_w: dict[int, float]
 
+    @cached_property
+    def strongest_parts(self) -> list[int]:
+        """The parts that are looked for in other cells: those with the most power, unless it is next to nothing."""
+        order = sorted(self.power_w, key=lambda i: -self.power_w[i])[:_MOST_PARTS]
+        return [i for i in order if not self.contributions.negligible(i)]
+
     def explained(self, number: int) -> ObjectExplanation:
         """Return the explanation of one object."""
         case = self.case
@@ -154,7 +164,7 @@ class _View:
         silent = echo is None or not np.any(echo.amplitude)
         middle = None if echo is None or silent else middle_of(echo)
         look = None if silent else self._look(number, mine)
-        others = [i for i in self.power_w if i != number and not self.contributions.negligible(i)]
+        others = [i for i in self.strongest_parts if i != number]
         verdict = self.judge.verdict(number, look, others, labels)
         return ObjectExplanation(
             object_id=number,
@@ -175,7 +185,7 @@ class _View:
         if found is None:
             return None
         look, azimuth, power = found
-        levels = {i: abs(look.beamformed(self.contributions.of(i))) for i in self.power_w}
+        levels = {i: abs(look.beamformed(self.contributions.of(i))) for i in self.strongest_parts}
         best = max(levels, key=lambda i: levels[i], default=-1)
         name = "noise" if best < 0 else self.case.names[best]
         return Peak(float(cube.range_m[look.row]), azimuth, db(power) + 30, best % GHOST if best >= 0 else -1, name)
@@ -216,7 +226,7 @@ class _View:
             "threshold_dbm": db(float(threshold[at])) + 30,
             "noise_threshold_dbm": db(float(self.judge.noise_threshold_w[at])) + 30,
             "shares": shares(self.contributions, look, others, number, self.case.names),
-            "waterfall": waterfall(self.contributions, number, look, middle.position, others),
+            "waterfall": waterfall(self.contributions, number, look, middle.position),
         }
 
 

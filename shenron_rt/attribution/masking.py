@@ -67,7 +67,7 @@ def masked(case: Case, contributions: Contributions, object_id: int, look: Look,
     Verdict or None
         ``None`` where it is not found without the others either.
     """
-    if not others or not found_in(contributions.without(others), object_id):
+    if not others or not found_in(contributions.alone(object_id), object_id):
         return None
     masker = _masker(case, contributions, object_id, look, others)
     own = db(contributions.map_of(object_id)[look.row, look.column])
@@ -80,7 +80,7 @@ def masked(case: Case, contributions: Contributions, object_id: int, look: Look,
         "folded_velocity_mps": look.velocity_mps,
         "masker_velocity_mps": masker.velocity_mps,
         "max_velocity_mps": case.cube.profile.max_velocity_mps,
-        "found_without": [masker.object_id] if masker.alone else others,
+        "found_without": [masker.name] if masker.alone else ["all others"],
     }
     if masker.how == "ambiguous":
         text = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,12 +13,12 @@ from ..config.profile import RadarProfile
 from ..config.scene import Actor, PointTarget, Scene, StaticPart
 from ..returns import Returns, illuminate
 from ..scatterers import Scatterers
-from ..scene.world import build_world, load_bodies
+from ..scene.world import World, build_world, load_bodies
 from ..tracing import trace
 from ..tracing.backend import choose_backend
 from ..tracing.caster import RayCaster
 
-__all__ = ["Blockers", "Unhidden", "isotropic", "unhidden"]
+__all__ = ["Blockers", "Surroundings", "Unhidden", "isotropic", "unhidden"]
 
 #: Rays at an object that is looked at alone, and over the whole sphere where it surrounds the radar.
 _AIM, _RAYS = 20_000, 20_000
@@ -118,20 +119,45 @@ def isotropic(profile: RadarProfile) -> RadarProfile:
     return RadarProfile.model_validate(data)  # built anew: a copy would keep the cached pattern
 
 
-def unhidden(
-    scene: Scene, profile: RadarProfile, object_id: int, *, radar: str, time: float, seed: int, frame: int, model: str
-) -> Unhidden | None:
-    """Look at one object alone.
+@dataclass(frozen=True)
+class Surroundings:
+    """A scene as one radar has it in one frame, with rays to cast through all of it.
 
     Parameters
     ----------
     scene : Scene
     profile : RadarProfile
         The radar's.
-    object_id : int
     radar : str
     time : float
         Scene seconds at the first chirp's start [s].
+    """
+
+    scene: Scene
+    profile: RadarProfile
+    radar: str
+    time: float
+
+    @cached_property
+    def world(self) -> World:
+        """All triangles at mid-frame."""
+        bodies, materials = load_bodies(self.scene)
+        middle = self.time + self.profile.frame_mid_s
+        return build_world(self.scene, self.scene.radar(self.radar), middle, bodies, materials)
+
+    @cached_property
+    def caster(self) -> RayCaster:
+        """Casts rays at them."""
+        return RayCaster(self.world.vertices, self.world.faces, choose_backend("auto"))
+
+
+def unhidden(around: Surroundings, object_id: int, *, seed: int, frame: int, model: str) -> Unhidden | None:
+    """Look at one object alone.
+
+    Parameters
+    ----------
+    around : Surroundings
+    object_id : int
     seed, frame : int
         Of the random numbers.
     model : str
@@ -142,6 +168,7 @@ def unhidden(
     Unhidden or None
         ``None`` where the scene has no such object, or no part of it is turned towards the radar.
     """
+    scene, profile = around.scene, around.profile
     alone = _alone(scene, object_id)
     if alone is None:
         return None
@@ -150,7 +177,7 @@ def unhidden(
     level = quiet.level
     quiet.setLevel(logging.ERROR)  # advice on rays concerns the run's rays, not these
     try:
-        rows = trace(alone, everywhere, radar=radar, time=time, seed=seed, frame=frame, rays=_RAYS)
+        rows = trace(alone, everywhere, radar=around.radar, time=around.time, seed=seed, frame=frame, rays=_RAYS)
     finally:
         quiet.setLevel(level)
     rows = rows.select(rows.object_id == object_id)
@@ -160,7 +187,7 @@ def unhidden(
         scatterers=rows,
         returns=illuminate(rows, profile, model=model, materials=scene.materials),
         on_axis=illuminate(rows, everywhere, model=model, materials=scene.materials),
-        blockers=_blockers(scene, profile, rows, object_id, radar, time),
+        blockers=_blockers(around, rows, object_id),
     )
 
 
@@ -177,13 +204,9 @@ def _alone(scene: Scene, object_id: int) -> Scene | None:
     return scene.model_copy(update={"static": static, "actors": actors, "point_targets": points})
 
 
-def _blockers(
-    scene: Scene, profile: RadarProfile, rows: Scatterers, object_id: int, radar: str, time: float
-) -> Blockers:
+def _blockers(around: Surroundings, rows: Scatterers, object_id: int) -> Blockers:
     """Cast a ray to every row of an object through the whole scene."""
-    bodies, materials = load_bodies(scene)
-    world = build_world(scene, scene.radar(radar), time + profile.frame_mid_s, bodies, materials)
-    caster = RayCaster(world.vertices, world.faces, choose_backend("auto"))
+    world, caster = around.world, around.caster
     direction = rows.position / np.maximum(rows.range, 1e-12)[:, None]
     face = caster.cast(np.ascontiguousarray(direction.T, dtype=np.float32))
     weight = np.ones(len(rows)) if rows.area is None or not rows.area.sum() > 0 else rows.area

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from .contributions import Contributions
 from .masking import masked
 from .records import Verdict
 from .sources import Case
-from .unhidden import Unhidden, unhidden
+from .unhidden import Surroundings, Unhidden, unhidden
 from .waterfall import Link, db, link_of
 
 __all__ = ["Judge"]
@@ -59,6 +60,14 @@ class Judge:
         threshold = noise_threshold(cube, pfa=settings.pfa, power=level)
         return cls(case, contributions, threshold, int(np.searchsorted(cube.range_m, settings.blanking_m)))
 
+    @cached_property
+    def surroundings(self) -> Surroundings | None:
+        """The whole scene, made once a frame; None where there is none."""
+        case = self.case
+        if case.scene is None:
+            return None
+        return Surroundings(case.scene, case.cube.profile, case.radar, case.time)
+
     def margin_db(self, own: RadarCube, first_row: int | None = None) -> float:
         """Return by how much a noise-free cube stands over the threshold of noise at best, mean of channels [dB]."""
         start = self.first_row if first_row is None else first_row
@@ -98,16 +107,14 @@ class Judge:
         view = self._view(object_id)
         if view is None:
             return self._weak_or_absent(object_id, look, margin)
-        return self._lacking(object_id, view, margin, look)
+        return self._lacking(view, margin)
 
     def _view(self, object_id: int) -> Unhidden | None:
-        case = self.case
-        if case.scene is None or object_id == 0:
+        around = self.surroundings
+        if around is None or object_id == 0:
             return None
-        return unhidden(
-            case.scene, case.cube.profile, object_id, radar=case.radar, time=case.time, seed=case.seed,
-            frame=case.frame, model=case.returns.model,
-        )  # fmt: skip
+        case = self.case
+        return unhidden(around, object_id, seed=case.seed, frame=case.frame, model=case.returns.model)
 
     def _detected(self, labels: tuple[str, ...]) -> Verdict:
         kinds = sorted(set(labels))
@@ -141,68 +148,58 @@ class Judge:
         text = f"below noise: {-margin:.1f} dB under the threshold that noise alone sets"
         return Verdict("below noise", text, {"margin_db": margin}, _stronger(look.distance_m, -margin))
 
-    def _lacking(self, object_id: int, view: Unhidden, now: float, look: Look | None) -> Verdict:
+    def _lacking(self, view: Unhidden, now: float) -> Verdict:
         """Return the verdict on an object whose echo is too weak, or is not there."""
-        p, cube = self.case.cube.profile, self.case.cube
-        alone = self._margin_of(view, on_axis=False)
-        axis = self._margin_of(view, on_axis=True)
-        link = link_of(p, view.centre, cube.weather)
-        isotropic, apparent = self._isotropic(view, link)
+        tried = self._tried(view, now)
+        chosen = _choose(tried, now, view)
         by = view.blockers.first
-        numbers = {
-            "margin_db": now,
-            "margin_alone_db": alone,
-            "margin_on_axis_db": axis,
-            "margin_isotropic_db": isotropic,
-            "pattern_db": link.pattern_db,
-            "hidden_share": view.blockers.hidden_share,
-            "hidden_by": dict(view.blockers.by),
-            "unhidden_area_m2": view.area_m2,
-            "projected_area_m2": view.projected_m2,
-            "apparent_rcs_dbsm": apparent,
-        }
-        facing = link.unit_dbm + db(view.facing_m2(p.wavelength_m)) - self._threshold_dbm(link)
-        numbers["margin_facing_db"] = facing
-        mirrored = max(isotropic, facing) if isotropic >= -_NEARLY_DB else isotropic
-        mirror_db = db(view.projected_m2) - apparent if view.projected_m2 > 0 else -math.inf
-        causes = {
-            "occluded": (alone - now if view.blockers.hidden_share >= _HIDDEN else -math.inf, alone),
-            "outside the beam": (-link.pattern_db if link.pattern_db <= _PATTERN_DB else -math.inf, axis),
-            "specular away": (mirror_db if mirror_db >= _MIRROR_DB else -math.inf, mirrored),
-        }
-        chosen = self._choose(causes, now, view, alone, mirrored - link.pattern_db)
         if chosen == "occluded":
             text = f"occluded by {by}: {view.blockers.by[0][1]:.0%} of its surface lies behind it"
-            return Verdict("occluded", text, numbers, _without(by, alone), by)
+            return Verdict("occluded", text, tried.numbers, _without(by, tried.alone), by)
         if chosen == "outside the beam":
-            text = f"outside the beam: the pattern takes {-link.pattern_db:.1f} dB both ways there"
-            return Verdict("outside the beam", text, numbers, _turn_radar(view.centre, axis))
+            text = f"outside the beam: the pattern takes {-tried.link.pattern_db:.1f} dB both ways there"
+            return Verdict("outside the beam", text, tried.numbers, _turn_radar(view.centre, tried.on_axis))
         if chosen == "specular away":
             text = (
-                f"specular away: {view.projected_m2:.3g} m^2 face the radar, and echo like {apparent:.1f} dBsm, "
-                f"{mirror_db:.0f} dB less than an isotropic surface of that area"
+                f"specular away: {view.projected_m2:.3g} m^2 face the radar, and echo like {tried.apparent_dbsm:.1f} "
+                f"dBsm, {tried.mirror_db(view):.0f} dB less than an isotropic surface of that area"
             )
             turn = view.turn_deg()
             change = "" if turn is None else f"turn it by {turn:.0f} deg, so that it faces the radar"
-            return Verdict("specular away", text, numbers, change)
-        best = max(now, alone)
+            return Verdict("specular away", text, tried.numbers, change)
+        best = max(now, tried.alone)
         text = f"below noise: {-best:.1f} dB under the threshold that noise alone sets"
-        return Verdict("below noise", text, numbers, _stronger(link.distance_m, -best))
+        return Verdict("below noise", text, tried.numbers, _stronger(tried.link.distance_m, -best))
 
-    @staticmethod
-    def _choose(
-        causes: dict[str, tuple[float, float]], now: float, view: Unhidden, alone: float, everything: float
-    ) -> str:
-        """Return the cause whose removal suffices, upstream first; else the largest of several that do together."""
-        if view.blockers.hidden_share > _MOSTLY and not math.isfinite(now):
-            return "occluded"  # nothing of it was met; whatever else it lacks comes after
-        for name, (loss, margin) in causes.items():
-            if loss > 0 and margin >= 0:
-                return name
-        losses = {name: loss for name, (loss, _) in causes.items() if loss > 0 and name != "occluded"}
-        if losses and everything >= 0 > alone:
-            return max(losses, key=lambda name: losses[name])
-        return "below noise"
+    def _tried(self, view: Unhidden, now: float) -> _Tried:
+        """Return what the object would be worth without each thing that may hide it."""
+        link = link_of(self.case.cube.profile, view.centre, self.case.cube.weather)
+        isotropic, apparent = self._isotropic(view, link)
+        facing_m2 = view.facing_m2(self.case.cube.profile.wavelength_m)
+        tried = _Tried(
+            link=link,
+            alone=self._margin_of(view, on_axis=False),
+            on_axis=self._margin_of(view, on_axis=True),
+            isotropic=isotropic,
+            facing=link.unit_dbm + db(facing_m2) - self._threshold_dbm(link),
+            apparent_dbsm=apparent,
+        )
+        tried.numbers.update(
+            {
+                "margin_db": now,
+                "margin_alone_db": tried.alone,
+                "margin_on_axis_db": tried.on_axis,
+                "margin_isotropic_db": tried.isotropic,
+                "margin_facing_db": tried.facing,
+                "pattern_db": link.pattern_db,
+                "hidden_share": view.blockers.hidden_share,
+                "hidden_by": dict(view.blockers.by),
+                "unhidden_area_m2": view.area_m2,
+                "projected_area_m2": view.projected_m2,
+                "apparent_rcs_dbsm": apparent,
+            }
+        )
+        return tried
 
     def _margin_of(self, view: Unhidden, *, on_axis: bool) -> float:
         """Return the margin of an object that is looked at alone."""
@@ -222,6 +219,47 @@ class Judge:
         margin = link.unit_dbm + db(view.projected_m2) - self._threshold_dbm(link)
         power = db(sum(view.returns.power_by_object().values())) + 30 if len(view.returns) else -math.inf
         return margin, power - link.unit_dbm
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """Margins over the threshold of noise [dB]: alone in the scene, on the beam's axis, isotropic, facing the radar."""
+
+    link: Link
+    alone: float
+    on_axis: float
+    isotropic: float
+    facing: float
+    apparent_dbsm: float
+    numbers: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def mirrored(self) -> float:
+        """What it would be worth if its surface did not mirror the wave elsewhere."""
+        return max(self.isotropic, self.facing) if self.isotropic >= -_NEARLY_DB else self.isotropic
+
+    def mirror_db(self, view: Unhidden) -> float:
+        """By how much the echo is weaker than that of an isotropic surface of its projected area."""
+        return db(view.projected_m2) - self.apparent_dbsm if view.projected_m2 > 0 else -math.inf
+
+
+def _choose(tried: _Tried, now: float, view: Unhidden) -> str:
+    """Return the cause whose removal suffices, upstream first; else the largest of several that do together."""
+    pattern, mirror, hidden = tried.link.pattern_db, tried.mirror_db(view), view.blockers.hidden_share
+    if hidden > _MOSTLY and not math.isfinite(now):
+        return "occluded"  # nothing of it was met; whatever else it lacks comes after
+    causes = {
+        "occluded": (tried.alone - now if hidden >= _HIDDEN else -math.inf, tried.alone),
+        "outside the beam": (-pattern if pattern <= _PATTERN_DB else -math.inf, tried.on_axis),
+        "specular away": (mirror if mirror >= _MIRROR_DB else -math.inf, tried.mirrored),
+    }
+    for name, (loss, margin) in causes.items():
+        if loss > 0 and margin >= 0:
+            return name
+    losses = {name: loss for name, (loss, _) in causes.items() if loss > 0 and name != "occluded"}
+    if losses and tried.mirrored - pattern >= 0 > tried.alone:
+        return max(losses, key=lambda name: losses[name])
+    return "below noise"
 
 
 def _stronger(distance_m: float, lacking_db: float) -> str:

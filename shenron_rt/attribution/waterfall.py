@@ -66,9 +66,7 @@ class _Ledger:
         self.stages.append(Stage(name, gain_db, self.level, "dBm" if unit == "dBm" else "dB", note))
 
 
-def waterfall(
-    contributions: Contributions, object_id: int, look: Look, centre: FloatArray, others: list[int]
-) -> Waterfall:
+def waterfall(contributions: Contributions, object_id: int, look: Look, centre: FloatArray) -> Waterfall:
     """Return the budget of one object in one cell.
 
     Parameters
@@ -78,8 +76,6 @@ def waterfall(
     look : Look
     centre : (3,) float
         The object's middle by power, radar frame; the range, pattern and weather of the radar equation hold there [m].
-    others : list of int
-        Objects that may be in the cell beside it.
 
     Notes
     -----
@@ -99,7 +95,7 @@ def waterfall(
     _processing_stages(ledger, cube, own, look, (power, float(ranges[look.row])))
     alone = ledger.level
     amplitude = look.beamformed(own)
-    beside = sum((look.beamformed(contributions.of(i)) for i in others), 0.0 + 0.0j)
+    beside = look.beamformed(contributions.whole) - amplitude
     measured = look.beamformed(cube)
     ledger.add("others in the cell", 2 * db(abs(amplitude + beside) / abs(amplitude)), "dB", "added as phasors")
     draw = 2 * db(abs(measured) / abs(amplitude + beside)) if abs(amplitude + beside) > 0 else math.inf
