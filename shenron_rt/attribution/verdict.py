@@ -106,7 +106,7 @@ class Judge:
                 return found or self._fluctuation(object_id, look, margin)
         view = self._view(object_id)
         if view is None:
-            return self._weak_or_absent(object_id, look, margin)
+            return self._weak_or_absent(look, margin)
         return self._lacking(view, margin)
 
     def _view(self, object_id: int) -> Unhidden | None:
@@ -141,7 +141,7 @@ class Judge:
         text = f"below noise: {margin:.1f} dB over the threshold of noise are lost in this frame's draw"
         return Verdict("below noise", text, numbers, _stronger(look.distance_m, 3.0 - min(margin, 0.0)))
 
-    def _weak_or_absent(self, object_id: int, look: Look | None, margin: float) -> Verdict:
+    def _weak_or_absent(self, look: Look | None, margin: float) -> Verdict:
         if look is None or not math.isfinite(margin):
             where = "no scene to ask why" if self.case.scene is None else "nothing of it is turned towards the radar"
             return Verdict("absent", f"not met by any ray: {where}", {}, "")
