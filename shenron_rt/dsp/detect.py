@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._typing import BoolArray, FloatArray, IntArray, NDArray
+from .._typing import BoolArray, ComplexArray, FloatArray, IntArray, NDArray
 from ..constants import RCS_FLOOR_DBSM, SPEED_OF_LIGHT
 from ..errors import InputError
 from ..physics.link_budget import rcs_from_power
