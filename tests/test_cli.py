@@ -163,7 +163,7 @@ def test_profiles_lists_all_and_shows_one_with_sources(capsys: pytest.CaptureFix
     out = capsys.readouterr().out
     for name in (
         "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "radarbook", "radarbook2",
-        "ti_cascade", "mmwcas",
+        "radarbook_200mhz", "ti_cascade", "mmwcas",
     ):  # fmt: skip
         assert f" {name} " in out
     assert "R max [m]" in out

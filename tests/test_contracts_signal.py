@@ -18,7 +18,7 @@ from shenron_rt.scatterers import Scatterers
 
 PROFILES = [
     "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "mmwcas", "radarbook",
-    "radarbook2", "ti_cascade",
+    "radarbook2", "radarbook_200mhz", "ti_cascade",
 ]  # fmt: skip
 
 

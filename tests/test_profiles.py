@@ -17,7 +17,7 @@ from shenron_rt.resources import package_folder
 
 NAMES = (
     "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "mmwcas", "radarbook",
-    "radarbook2", "ti_cascade",
+    "radarbook2", "radarbook_200mhz", "ti_cascade",
 )  # fmt: skip
 
 
