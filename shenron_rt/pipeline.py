@@ -81,7 +81,7 @@ def simulate(
     seed: int | None = None,
     frame: int = 0,
     rays: int = 300_000,
-    max_bounces: int = 1,
+    max_bounces: int | None = None,
     model: str | ShenronModel = "physical",
     noise: str | None = "thermal",
     mount: Pose | None = None,

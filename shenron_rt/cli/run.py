@@ -67,7 +67,7 @@ def run(
     rays
         Rays of each radar and frame. Default: 300000.
     max_bounces
-        Surfaces along a path, 1 to 5. Default: 1.
+        Surfaces along a path, 1 to 5. Default: the scene's, 1 unless it says otherwise.
     backend
         Ray tracing backend. Default: auto (cuda, then llvm, then scalar).
     accuracy
@@ -84,7 +84,7 @@ def run(
         "frames": frames, "rays": rays, "max_bounces": max_bounces, "backend": backend, "accuracy": accuracy,
         "model": model,
     }  # fmt: skip
-    options = _options(loaded.run, given)
+    options = _options({"max_bounces": loaded.max_bounces, **loaded.run}, given)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
     if not loaded.radars:

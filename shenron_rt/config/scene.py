@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from ..constants import DEFAULT_MOUNT_XYZ
+from ..constants import DEFAULT_MOUNT_XYZ, MOST_SCENE_BOUNCES
 from ..errors import InputError, did_you_mean
 from ..resources import find, package_folder
 from ..scatterers import Weather
@@ -150,6 +150,8 @@ class Scene(ConfigModel):
     description: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
     frame_period_s: Annotated[float, Field(gt=0)] = 0.1
+    #: Surfaces along a path, for scenes whose echoes need several; ``trace`` and the command line can say otherwise.
+    max_bounces: Annotated[int, Field(ge=1, le=MOST_SCENE_BOUNCES)] = 1
     materials: str | Path = "automotive"
     weather: WeatherModel | None = None
     ego: Ego = Ego()
