@@ -15,6 +15,7 @@ from ..config.profile import RadarProfile
 from ..config.scene import Scene
 from ..constants import MOST_SCENE_BOUNCES
 from ..errors import InputError
+from ..paths import Paths
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
 from ..scene.motion import BodyState
@@ -26,6 +27,7 @@ from .caster import RayCaster
 from .launch import Cells, aimed_cells, pattern_cells, turned
 from .launches import Launch, launch_directions
 from .mirrors import bounced_paths, image_launches
+from .points import point_paths
 
 __all__ = ["trace"]
 
@@ -104,13 +106,15 @@ def trace(
         for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
         for block in _all_rows(world, launch.cells, p, h, d.result())
     ]
-    rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s))
+    points = _point_rows(scene, world, caster, time + profile.frame_mid_s)
+    rows.append(points)
     columns: dict[str, Any] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     bounced = None
     if max_bounces > 1:
         wavenumber = 2.0 * np.pi / profile.wavelength_m
         image = image_launches(world, caster, aimed, run_seed, frame, mount.name)
         bounced = bounced_paths(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
+        bounced = Paths.join([bounced, point_paths(world, caster, points, max_bounces)])
     return Scatterers(
         **columns,
         paths=bounced,
