@@ -115,7 +115,7 @@ def rms(error: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Levels:
-    """Levels at ``RANGES`` [dBsm]: detected, near-range and far-field in free space; detected and wanted over asphalt."""
+    """Levels at ``RANGES`` [dBsm]: detected, near-range, far-field in free space; detected and wanted over a road."""
 
     free: FloatArray
     near: FloatArray
