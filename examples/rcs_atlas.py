@@ -1,0 +1,65 @@
+"""Measure docs/rcs-atlas.md: ``python examples/rcs_atlas.py``; ``--write`` puts results, tables and pictures there.
+
+Every case is kept in ``out/rcs_atlas`` as it goes, so that an interrupted run goes on where it stopped; what another state
+of the solver has computed counts as missing. ``--only WORD`` takes the cases whose name begins so (may be given again),
+the others stay as docs/rcs-atlas.json has them; ``--list`` names them. ``--page`` writes page and pictures again from
+that file alone. ``--quick`` measures only the pedestrian at 24 GHz and every 30 deg, for a test of the machinery.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from atlas import cases, distance, figures, page, store
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE, RESULTS, IMAGES = ROOT / "docs/rcs-atlas.md", ROOT / "docs/rcs-atlas.json", ROOT / "docs/images"
+PARTS = ROOT / "out/rcs_atlas"
+
+
+def all_cases() -> list[cases.Case]:
+    """Return every case of the page, the cheap ones of a kind first."""
+    return [*cases.turntable_cases(), *cases.roof_cases(), *cases.why_cases(), *distance.distance_cases()]
+
+
+def chosen(only: list[str] | None, quick: bool) -> list[cases.Case]:
+    """Return the cases that were asked for."""
+    if quick:
+        whole = next(c for c in all_cases() if c.name == "pedestrian-24-25m")
+        return [replace(whole, name="quick", x=whole.x[::15])]
+    return [c for c in all_cases() if only is None or c.name.startswith(tuple(only))]
+
+
+def main() -> None:
+    """Measure, print, and write if asked."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="update docs/rcs-atlas.json, the page and its pictures")
+    parser.add_argument("--only", action="append", metavar="WORD", help="cases whose name begins so")
+    parser.add_argument("--fresh", action="store_true", help="take nothing that was kept")
+    parser.add_argument("--page", action="store_true", help="write the page from docs/rcs-atlas.json, measure nothing")
+    parser.add_argument("--quick", action="store_true", help="one target, twelve aspects")
+    parser.add_argument("--list", action="store_true", help="name the cases and stop")
+    args = parser.parse_args()
+    logging.disable(logging.WARNING)
+    wanted = [] if args.page else chosen(args.only, args.quick)
+    if args.list:
+        print("\n".join(c.name for c in wanted))
+        return
+    curves = {}
+    for case in wanted:
+        curves[case.name] = store.compute(case, PARTS, fresh=args.fresh)
+        print(page.line(case.name, curves[case.name]), file=sys.stderr, flush=True)
+        if args.write and not args.quick:
+            store.save(RESULTS, store.load(RESULTS) | {case.name: curves[case.name]})
+    if (args.write and not args.quick) or args.page:
+        found = store.load(RESULTS)
+        page.write(PAGE, found)
+        figures.write(IMAGES, found)
+
+
+if __name__ == "__main__":
+    main()
