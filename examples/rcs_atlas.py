@@ -1,9 +1,9 @@
 """Measure docs/rcs-atlas.md: ``python examples/rcs_atlas.py``; ``--write`` puts results, tables and pictures there.
 
-Every case is kept in ``out/rcs_atlas`` as it goes, so that an interrupted run goes on where it stopped; what another state
-of the solver has computed counts as missing. ``--only WORD`` takes the cases whose name begins so (may be given again),
-the others stay as docs/rcs-atlas.json has them; ``--list`` names them. ``--page`` writes page and pictures again from
-that file alone. ``--quick`` measures only the pedestrian at 24 GHz and every 30 deg, for a test of the machinery.
+Every case is kept in ``out/rcs_atlas`` as it goes, so that an interrupted run goes on where it stopped; what another
+state of the solver has computed counts as missing. ``--only WORD`` takes the cases whose name begins so (may be given
+again), the others stay as docs/rcs-atlas.json has them; ``--list`` names them. ``--page`` writes page and pictures
+again from that file alone. ``--quick`` measures the pedestrian at 24 GHz every 45 deg, to see that all is in place.
 """
 
 from __future__ import annotations
@@ -23,7 +23,13 @@ PARTS = ROOT / "out/rcs_atlas"
 
 def all_cases() -> list[cases.Case]:
     """Return every case of the page, the cheap ones of a kind first."""
-    return [*cases.turntable_cases(), *cases.roof_cases(), *cases.why_cases(), *distance.distance_cases()]
+    return [
+        *cases.turntable_cases(),
+        *cases.roof_cases(),
+        *cases.why_cases(),
+        *cases.sampling_cases(),
+        *distance.distance_cases(),
+    ]
 
 
 def chosen(only: list[str] | None, quick: bool) -> list[cases.Case]:
@@ -41,7 +47,7 @@ def main() -> None:
     parser.add_argument("--only", action="append", metavar="WORD", help="cases whose name begins so")
     parser.add_argument("--fresh", action="store_true", help="take nothing that was kept")
     parser.add_argument("--page", action="store_true", help="write the page from docs/rcs-atlas.json, measure nothing")
-    parser.add_argument("--quick", action="store_true", help="one target, twelve aspects")
+    parser.add_argument("--quick", action="store_true", help="one target, eight aspects")
     parser.add_argument("--list", action="store_true", help="name the cases and stop")
     args = parser.parse_args()
     logging.disable(logging.WARNING)

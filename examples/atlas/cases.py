@@ -100,9 +100,7 @@ def mesh_of(shape: str, point_m: tuple[float, float, float], without: tuple[str,
     """Return a shape moved so that a point of it is the origin, some groups of its parts being air."""
     mesh = make_shape(shape)
     absent = [any(word in p.group for word in without) for p in mesh.parts]
-    parts = tuple(
-        replace(p, em_material="air") if gone else p for p, gone in zip(mesh.parts, absent, strict=True)
-    )
+    parts = tuple(replace(p, em_material="air") if gone else p for p, gone in zip(mesh.parts, absent, strict=True))
     return replace(mesh, vertices=mesh.vertices - np.asarray(point_m), parts=parts)
 
 
@@ -144,16 +142,21 @@ def roof_cases() -> list[Case]:
     ]  # fmt: skip
 
 
+#: Windows that are fully sampled, lambda/2L for a width L: first and last aspect, step, and coarser steps [deg].
+SAMPLED = {"car": (40.0, 60.0, 0.1, (1.0, 2.0)), "pedestrian": (30.0, 50.0, 0.25, (1.0, 3.0))}
+TRIAL_RAYS = (0.5, 1.0)
 #: Label, and what differs from the circle.
 VARIANTS: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
     "car": {
         "one": ("first bounce only", {"max_bounces": 1}),
+        "rays": ("twice the rays per wavelength", {"rays_per_wavelength": 2.0}),
         "metal": ("all of it metal", {"material": "metal"}),
         "body": ("body and pillars absorb", {"without": ("body", "pillars")}),
         "wheels": ("wheels absorb", {"without": ("tyre", "rim")}),
     },
     "truck": {
         "one": ("first bounce only", {"max_bounces": 1}),
+        "rays": ("twice the rays per wavelength", {"rays_per_wavelength": 2.0}),
         "metal": ("all of it metal", {"material": "metal"}),
         "box": ("cargo box absorbs", {"without": ("cargo box",)}),
         "frame": ("frame and wheels absorb", {"without": ("frame", "wheel")}),
@@ -161,11 +164,13 @@ VARIANTS: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
     },
     "pedestrian": {
         "one": ("first bounce only", {"max_bounces": 1}),
+        "rays": ("twice the rays per wavelength", {"rays_per_wavelength": 2.0}),
         "metal": ("all of it metal", {"material": "metal"}),
         "skin": ("skin absorbs", {"without": ("skin",)}),
     },
     "bicycle": {
         "one": ("first bounce only", {"max_bounces": 1}),
+        "rays": ("twice the rays per wavelength", {"rays_per_wavelength": 2.0}),
         "metal": ("all of it metal", {"material": "metal"}),
         "frame": ("frame absorbs", {"without": ("frame",)}),
     },
@@ -181,6 +186,23 @@ def why_cases(ghz: float = 24.0) -> list[Case]:
         base = Case(f"why-{shape}-as-it-is", "azimuth_deg", x, shape, ghz, NEAR_M)
         found.append(base)
         found += [replace(base, name=f"why-{shape}-{key}", **change) for key, (_, change) in variants.items()]
-    return found
+    coarse = Case("", "azimuth_deg", tuple(np.arange(5.0, 180.0, 20.0).tolist()), "truck", 77.0, NEAR_M)
+    return [
+        *found,
+        *(replace(coarse, name=f"rays-truck-77-{rays:g}", rays_per_wavelength=rays) for rays in TRIAL_RAYS),
+    ]
 
 
+def sampling_cases() -> list[Case]:
+    """Return windows at a step that a full sampling asks for, 24 GHz, 25 m."""
+    return [
+        Case(
+            f"sampling-{shape}-24",
+            "azimuth_deg",
+            tuple(np.arange(low, high, fine).round(6).tolist()),
+            shape,
+            24.0,
+            NEAR_M,
+        )
+        for shape, (low, high, fine, _) in SAMPLED.items()
+    ]

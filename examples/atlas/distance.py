@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def distance_cases() -> list[Case]:
 
 
 def glint(range_m: FloatArray, *radii_m: float) -> FloatArray:
-    """Return pi prod R_i R/(R_i + R), geometric optics of a smooth patch at a range [m^2]; an infinite radius is flat."""
+    """Return pi prod R_i R/(R_i + R), geometric optics of a smooth patch [m^2]; an infinite radius is flat."""
     return np.asarray(math.pi * np.prod([range_m / (1.0 + range_m / r) for r in radii_m], axis=0))
 
 
@@ -93,6 +92,11 @@ def wall_reflectivity(ghz: float) -> float:
     te, _ = concrete.reflection(ghz * 1e9, 1.0)
     phase = 4.0 * math.pi / (SPEED_OF_LIGHT / (ghz * 1e9)) * concrete.roughness_rms_m
     return float(abs(np.asarray(te).item()) ** 2 * math.exp(-(phase**2)))
+
+
+def pole_on_turntable(range_m: float) -> float:
+    """Return pi R^3 a/(R - a)^2, an endless pole whose axis, not surface, stands at a range [m^2]."""
+    return math.pi * range_m**3 * POLE_RADIUS_M / (range_m - POLE_RADIUS_M) ** 2
 
 
 def pole_integral(range_m: FloatArray, ghz: float) -> FloatArray:

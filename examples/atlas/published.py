@@ -1,11 +1,13 @@
 """Published levels that the atlas draws in, with their sources; facts only.
 
-3GPP TR 38.901 V19.4.0, clause 7.9.2.1: an RCS is sigma_M sigma_D sigma_S, a mean, a pattern over angle, and a log-normal
-factor whose linear mean is 1. Tables 7.9.2.1-1 (human, model 1), -3 (human, model 2) and -4 (vehicle, one point).
+3GPP TR 38.901 V19.4.0, clause 7.9.2.1: an RCS is sigma_M sigma_D sigma_S, a mean, a pattern over angle, and a
+log-normal factor whose linear mean is 1. Tables 7.9.2.1-1 (human, model 1), -3 (human, model 2) and
+-4 (vehicle, one point).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +51,8 @@ VEHICLE = {
     "right": Lobe(270.0, 26.90, 79.70, 44.42, 20.75, 13.68),
 }
 HUMAN = {"front": Lobe(0.0, 216.65, 90.0, 55.7, 2.14, 7.7), "back": Lobe(180.0, 216.65, 90.0, 55.7, 2.14, 7.7)}
-ROOF_DBSM = 21.26
+#: From above: no pattern over azimuth.
+ROOF = Lobe(0.0, math.inf, 0.0, 18.13, 21.26, 14.19)
 #: 10 lg sigma_M [dBsm], and the standard deviation of 10 lg sigma_S [dB].
 MEAN_DBSM = {"vehicle": 11.25, "human": -1.37}
 SIGMA_DB = {"vehicle": 3.41, "human": 3.94}
@@ -77,6 +80,6 @@ def pattern_dbsm(kind: str, azimuth_deg: ArrayLike) -> FloatArray:
 
 
 def car_range_law(range_m: ArrayLike) -> FloatArray:
-    """Return min(10 lg(R/m) + 5, 20) dBsm in m^2: cars from front or back, Karnfelt et al. 2009 (a model, as MathWorks uses it)."""
+    """Return min(10 lg(R/m) + 5, 20) dBsm, in m^2: a car's front or back, Karnfelt et al. 2009, used by MathWorks."""
     level = np.minimum(10.0 * np.log10(np.asarray(range_m, dtype=np.float64)) + 5.0, 20.0)
     return np.asarray(10.0 ** (level / 10.0))
