@@ -19,10 +19,12 @@ NEAR_M = 25.0
 BANDS_GHZ = (24.0, 77.0)
 BOUNCES = 3
 #: Step of the aspect [deg]. Car and truck are their own mirror images, so that half a circle is swept.
-STEP_DEG = {"car": 1.0, "truck": 2.0, "pedestrian": 3.0, "bicycle": 3.0, "pole": 5.0}
+STEP_DEG = {"car": 2.0, "truck": 3.0, "pedestrian": 4.0, "bicycle": 4.0, "pole": 5.0}
 MIRRORED = ("car", "truck")
-#: Of the trials that say why: every tenth degree, off the axes of the body.
+#: Of the trials that say why: off the axes of the body.
 TRIAL_STEP_DEG, TRIAL_FIRST_DEG = 10.0, 5.0
+#: Turntables in the far field too; that of a truck begins kilometres away.
+FAR = ("car", "pedestrian", "bicycle", "pole")
 #: Fewer where an aspect has millions of cells; docs/rcs-atlas.md has what that changes.
 RAYS = {("truck", 77.0): 0.5, ("wall:6x3", 77.0): 0.5}
 
@@ -130,20 +132,21 @@ def turntable_cases() -> list[Case]:
             aspects(shape, step), shape, ghz, distance, rays_per_wavelength=RAYS.get((shape, ghz), 1.0),
         )
         for distance in (NEAR_M, None) for shape, step in STEP_DEG.items() for ghz in BANDS_GHZ
+        if distance is not None or shape in FAR
     ]  # fmt: skip
 
 
 def roof_cases() -> list[Case]:
     """Return the view from above the vehicles, from 70 deg of elevation to the zenith."""
     return [
-        Case(f"{shape}-{ghz:g}-roof", "elevation_deg", tuple(np.arange(70.0, 90.1, 1.0).tolist()), shape, ghz, NEAR_M,
+        Case(f"{shape}-{ghz:g}-roof", "elevation_deg", tuple(np.arange(70.0, 90.1, 2.0).tolist()), shape, ghz, NEAR_M,
              rays_per_wavelength=RAYS.get((shape, ghz), 1.0))
         for shape in MIRRORED for ghz in BANDS_GHZ
     ]  # fmt: skip
 
 
 #: Windows that are fully sampled, lambda/2L for a width L: first and last aspect, step, and coarser steps [deg].
-SAMPLED = {"car": (40.0, 60.0, 0.1, (1.0, 2.0)), "pedestrian": (30.0, 50.0, 0.25, (1.0, 3.0))}
+SAMPLED = {"car": (40.0, 50.0, 0.1, (1.0, 2.0)), "pedestrian": (30.0, 50.0, 0.25, (1.0, 4.0))}
 TRIAL_RAYS = (0.5, 1.0)
 #: Label, and what differs from the circle.
 VARIANTS: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
@@ -182,7 +185,8 @@ def why_cases(ghz: float = 24.0) -> list[Case]:
     found = []
     for shape, variants in VARIANTS.items():
         first = TRIAL_FIRST_DEG - (0.0 if shape in MIRRORED else 180.0)
-        x = tuple(np.arange(first, 180.0, TRIAL_STEP_DEG).tolist())
+        step = TRIAL_STEP_DEG if shape in MIRRORED else 1.5 * TRIAL_STEP_DEG
+        x = tuple(np.arange(first, 180.0, step).tolist())
         base = Case(f"why-{shape}-as-it-is", "azimuth_deg", x, shape, ghz, NEAR_M)
         found.append(base)
         found += [replace(base, name=f"why-{shape}-{key}", **change) for key, (_, change) in variants.items()]

@@ -41,13 +41,13 @@ def _distances(count: int) -> tuple[float, ...]:
 
 
 def _about(centre: float) -> tuple[float, ...]:
-    return tuple((centre + np.array([-2.0, -1.0, 0.1, 1.0, 2.0])).tolist())
+    return tuple((centre + np.array([-2.0, 0.1, 1.8])).tolist())
 
 
 def distance_cases() -> list[Case]:
     """Return the curves; a distance counts from the point of the target that is nearest to the radar.
 
-    Vehicles: mean power of five aspects within 2 deg, since single ones fade.
+    Vehicles: mean power of three aspects within 2 deg, since single ones fade.
     """
     spots: dict[str, tuple[str, tuple[float, float, float], tuple[float, ...], int]] = {
         "car-side": ("car", (0.0, 0.9, RADAR_HEIGHT_M), _about(90.0), 13),

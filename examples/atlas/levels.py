@@ -92,7 +92,7 @@ def published_lobe(kind: str, direction: str) -> float:
 
 
 def level_circle(kind: str) -> tuple[float, float]:
-    """Return median and mean of TR 38.901's RCS, pattern and log-normal factor, over the circle of a level radar [dBsm].
+    """Return median and mean of TR 38.901's RCS, pattern and log-normal factor, over a level radar's circle [dBsm].
 
     10 lg sigma_S has the mean -ln(10)/20 sigma^2 (equation 7.9.2-1), which makes the mean of sigma_S one.
     """

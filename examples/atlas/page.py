@@ -60,7 +60,7 @@ def _roof(found: Curves) -> list[list[str]]:
     rows = []
     for shape in MIRRORED:
         curves = [found.get(f"{shape}-{ghz:g}-roof") for ghz in BANDS_GHZ]
-        elevation = np.arange(80.0, 90.1, 1.0)
+        elevation = np.arange(80.0, 90.1, 2.0)
         level = mean_dbsm(np.array([float(ROOF.level(0.0, 90.0 - e)) for e in elevation]))
         cells = [
             "" if c is None else _beside(mean_dbsm(c.rcs_dbsm[c.x >= 80.0 - 1e-9]), level, SIGMA_DB["vehicle"])

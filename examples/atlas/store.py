@@ -17,8 +17,9 @@ from shenron_rt.io.npz import atomic_write
 
 from .cases import Case
 
-#: Seconds of work after which a part is written: what an interruption may cost.
-_PART_SECONDS = 20.0
+#: Values swept in one call and then written: what an interruption may cost. The lattice of rays is shifted anew for
+#: every aspect of a call, so that fixed parts give the same numbers again, whenever a run was interrupted.
+PART = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,22 +102,18 @@ def compute(case: Case, folder: Path, *, fresh: bool = False) -> Curve:
         Begin anew.
     """
     file = folder / f"{case.name}.json"
-    wanted, solver = np.asarray(case.x, dtype=np.float64), solver_state()
-    done: dict[float, float] = {}
-    seconds = 0.0
+    wanted, solver = np.round(np.asarray(case.x, dtype=np.float64), 6), solver_state()
+    kept = Curve(case.settings(), wanted[:0], wanted[:0], 0.0, solver)
     old = load(file).get(case.name)
-    if old is not None and not fresh and old.settings == case.settings() and old.solver == solver:
-        done, seconds = dict(zip(old.x.tolist(), old.rcs_dbsm.tolist(), strict=True)), old.seconds
-    count = 4
-    while missing := [x for x in np.round(wanted, 6).tolist() if x not in done]:
-        part = np.array(missing[:count])
+    fits = old is not None and old.settings == kept.settings and old.solver == solver
+    if old is not None and fits and not fresh and np.array_equal(old.x, wanted[: len(old.x)]):
+        kept = old
+    while len(kept.x) < len(wanted):
+        part = wanted[len(kept.x) : len(kept.x) + PART]
         begun = time.perf_counter()
-        level = 10.0 * np.log10(np.maximum(case.sweep(part), 1e-12))
-        spent = time.perf_counter() - begun
-        done |= dict(zip(part.tolist(), np.round(level, 2).tolist(), strict=True))
-        seconds += spent
-        count = int(np.clip(count * _PART_SECONDS / max(spent, 0.1), 1, 4 * count))
-        x = np.array(sorted(done))
-        save(file, {case.name: Curve(case.settings(), x, np.array([done[v] for v in x.tolist()]), seconds, solver)})
-    x = np.round(wanted, 6)
-    return Curve(case.settings(), x, np.array([done[v] for v in x.tolist()]), seconds, solver)
+        level = np.round(10.0 * np.log10(np.maximum(case.sweep(part), 1e-12)), 2)
+        seconds = kept.seconds + time.perf_counter() - begun
+        x, level = np.concatenate([kept.x, part]), np.concatenate([kept.rcs_dbsm, level])
+        kept = Curve(kept.settings, x, level, seconds, solver)
+        save(file, {case.name: kept})
+    return kept
