@@ -102,7 +102,8 @@ def compute(case: Case, folder: Path, *, fresh: bool = False) -> Curve:
         Begin anew.
     """
     file = folder / f"{case.name}.json"
-    wanted, solver = np.round(np.asarray(case.x, dtype=np.float64), 6), solver_state()
+    wanted: FloatArray = np.round(np.array(case.x, dtype=np.float64), 6)
+    solver = solver_state()
     kept = Curve(case.settings(), wanted[:0], wanted[:0], 0.0, solver)
     old = load(file).get(case.name)
     fits = old is not None and old.settings == kept.settings and old.solver == solver
