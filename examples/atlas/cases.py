@@ -146,7 +146,7 @@ def roof_cases() -> list[Case]:
 
 
 #: Windows that are fully sampled, lambda/2L for a width L: first and last aspect, step, and coarser steps [deg].
-SAMPLED = {"car": (40.0, 50.0, 0.1, (1.0, 2.0)), "pedestrian": (30.0, 50.0, 0.25, (1.0, 4.0))}
+SAMPLED = {"car": (40.0, 50.0, 0.1, (1.0, 2.0)), "pedestrian": (30.0, 50.0, 0.4, (2.0, 4.0))}
 TRIAL_RAYS = (0.5, 1.0)
 #: Label, and what differs from the circle.
 VARIANTS: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {

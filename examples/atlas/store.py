@@ -102,7 +102,7 @@ def compute(case: Case, folder: Path, *, fresh: bool = False) -> Curve:
         Begin anew.
     """
     file = folder / f"{case.name}.json"
-    wanted: FloatArray = np.round(np.array(case.x, dtype=np.float64), 6)
+    wanted = np.array([round(v, 6) for v in case.x], dtype=np.float64)
     solver = solver_state()
     kept = Curve(case.settings(), wanted[:0], wanted[:0], 0.0, solver)
     old = load(file).get(case.name)
