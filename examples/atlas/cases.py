@@ -18,8 +18,8 @@ RADAR_HEIGHT_M = 0.65
 NEAR_M = 25.0
 BANDS_GHZ = (24.0, 77.0)
 BOUNCES = 3
-#: Step of the aspect [deg]. Car and truck are their own mirror images, so that half a circle is swept.
-STEP_DEG = {"car": 2.0, "truck": 3.0, "pedestrian": 4.0, "bicycle": 4.0, "pole": 5.0}
+#: Step of the aspect at 25 m, twice that in the far field [deg]. Car and truck are their own mirror images, so that half a circle is swept.
+STEP_DEG = {"car": 2.0, "truck": 4.0, "pedestrian": 4.0, "bicycle": 4.0, "pole": 5.0}
 MIRRORED = ("car", "truck")
 #: Of the trials that say why: off the axes of the body.
 TRIAL_STEP_DEG, TRIAL_FIRST_DEG = 10.0, 5.0
@@ -129,7 +129,7 @@ def turntable_cases() -> list[Case]:
     return [
         Case(
             f"{shape}-{ghz:g}-{'far' if distance is None else f'{distance:g}m'}", "azimuth_deg",
-            aspects(shape, step), shape, ghz, distance, rays_per_wavelength=RAYS.get((shape, ghz), 1.0),
+            aspects(shape, step if distance is not None else 2.0 * step), shape, ghz, distance, rays_per_wavelength=RAYS.get((shape, ghz), 1.0),
         )
         for distance in (NEAR_M, None) for shape, step in STEP_DEG.items() for ghz in BANDS_GHZ
         if distance is not None or shape in FAR
@@ -185,12 +185,12 @@ def why_cases(ghz: float = 24.0) -> list[Case]:
     found = []
     for shape, variants in VARIANTS.items():
         first = TRIAL_FIRST_DEG - (0.0 if shape in MIRRORED else 180.0)
-        step = TRIAL_STEP_DEG if shape in MIRRORED else 1.5 * TRIAL_STEP_DEG
+        step = TRIAL_STEP_DEG if shape in MIRRORED else 2.0 * TRIAL_STEP_DEG
         x = tuple(np.arange(first, 180.0, step).tolist())
         base = Case(f"why-{shape}-as-it-is", "azimuth_deg", x, shape, ghz, NEAR_M)
         found.append(base)
         found += [replace(base, name=f"why-{shape}-{key}", **change) for key, (_, change) in variants.items()]
-    coarse = Case("", "azimuth_deg", tuple(np.arange(5.0, 180.0, 20.0).tolist()), "truck", 77.0, NEAR_M)
+    coarse = Case("", "azimuth_deg", tuple(np.arange(5.0, 180.0, 40.0).tolist()), "truck", 77.0, NEAR_M)
     return [
         *found,
         *(replace(coarse, name=f"rays-truck-77-{rays:g}", rays_per_wavelength=rays) for rays in TRIAL_RAYS),

@@ -50,9 +50,9 @@ def distance_cases() -> list[Case]:
     Vehicles: mean power of three aspects within 2 deg, since single ones fade.
     """
     spots: dict[str, tuple[str, tuple[float, float, float], tuple[float, ...], int]] = {
-        "car-side": ("car", (0.0, 0.9, RADAR_HEIGHT_M), _about(90.0), 13),
-        "car-back": ("car", (-2.25, 0.0, RADAR_HEIGHT_M), _about(180.0), 13),
-        "truck-back": ("truck", (-4.0, 0.0, RADAR_HEIGHT_M), _about(180.0), 13),
+        "car-side": ("car", (0.0, 0.9, RADAR_HEIGHT_M), _about(90.0), 10),
+        "car-back": ("car", (-2.25, 0.0, RADAR_HEIGHT_M), _about(180.0), 10),
+        "truck-back": ("truck", (-4.0, 0.0, RADAR_HEIGHT_M), _about(180.0), 10),
         "pole": ("pole", (POLE_RADIUS_M, 0.0, RADAR_HEIGHT_M), (0.0,), 31),
         "guard_rail": (
             "guard_rail:l=8", (0.0, -RAIL_DEPTH_M, RAIL_TOP_M - 0.5 * RAIL_HEIGHT_M), (-90.0,), 25,
