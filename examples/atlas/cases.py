@@ -18,7 +18,8 @@ RADAR_HEIGHT_M = 0.65
 NEAR_M = 25.0
 BANDS_GHZ = (24.0, 77.0)
 BOUNCES = 3
-#: Step of the aspect at 25 m, twice that in the far field [deg]. Car and truck are their own mirror images, so that half a circle is swept.
+#: Step of the aspect at 25 m, twice that in the far field [deg]. Car and truck mirror, so that half a circle
+#: is swept.
 STEP_DEG = {"car": 2.0, "truck": 4.0, "pedestrian": 4.0, "bicycle": 4.0, "pole": 5.0}
 MIRRORED = ("car", "truck")
 #: Of the trials that say why: off the axes of the body.
@@ -125,13 +126,12 @@ def full_circle(shape: str, azimuth_deg: FloatArray, rcs: FloatArray) -> tuple[F
 
 
 def turntable_cases() -> list[Case]:
-    """Return the circles: every target in both bands, at 25 m and in the far field."""
+    """Return the circles: every target in both bands, at 25 m and, of most, in the far field."""
     return [
-        Case(
-            f"{shape}-{ghz:g}-{'far' if distance is None else f'{distance:g}m'}", "azimuth_deg",
-            aspects(shape, step if distance is not None else 2.0 * step), shape, ghz, distance, rays_per_wavelength=RAYS.get((shape, ghz), 1.0),
-        )
-        for distance in (NEAR_M, None) for shape, step in STEP_DEG.items() for ghz in BANDS_GHZ
+        Case(f"{shape}-{ghz:g}-{place}", "azimuth_deg", aspects(shape, factor * step), shape, ghz, distance,
+             rays_per_wavelength=RAYS.get((shape, ghz), 1.0))
+        for place, distance, factor in ((f"{NEAR_M:g}m", NEAR_M, 1.0), ("far", None, 2.0))
+        for shape, step in STEP_DEG.items() for ghz in BANDS_GHZ
         if distance is not None or shape in FAR
     ]  # fmt: skip
 

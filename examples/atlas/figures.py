@@ -98,7 +98,7 @@ def _polar(axes: Any, shape: str, circle: Circle, far: Circle | None) -> None:
         axes.plot(*_closed(fine, np.maximum(pattern_dbsm(KIND[shape], fine), low)), color=PUBLISHED, lw=1.3)
     axes.set_ylim(low, top)
     axes.set_yticks(np.arange(10 * np.ceil((low + 1) / 10), top + 0.1, 10))
-    axes.set_thetagrids(np.arange(0, 360, 45), ["nose", "45", "left", "135", "tail", "-135", "right", "-45"])
+    axes.set_thetagrids(np.arange(0, 360, 45), ["front", "45", "left", "135", "back", "-135", "right", "-45"])
     axes.set_rlabel_position(-22)
     axes.tick_params(labelsize=8)
     axes.grid(color=GRID, lw=0.6)
