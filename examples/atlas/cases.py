@@ -166,6 +166,8 @@ VARIANTS: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
         "cab": ("cab and its windows absorb", {"without": ("cab", "windscreen", "door windows")}),
     },
     "pedestrian": {
+        "at-77": ("77 GHz", {"ghz": 77.0}),
+        "metal-at-77": ("77 GHz, all of it metal", {"ghz": 77.0, "material": "metal"}),
         "one": ("first bounce only", {"max_bounces": 1}),
         "rays": ("twice the rays per wavelength", {"rays_per_wavelength": 2.0}),
         "metal": ("all of it metal", {"material": "metal"}),

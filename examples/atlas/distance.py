@@ -19,12 +19,12 @@ RAIL_DEPTH_M, RAIL_HEIGHT_M, RAIL_TOP_M = 0.081, 0.312, 0.75
 #: Radii of the car's side, and of its back: docs/car-rcs.md.
 CAR_RADII_M = {"side": (7.3, 6.5), "back": (1.4, 6.5)}
 FORMULAS = {
-    "car-side": "pi R1 R/(R1 + R) R2 R/(R2 + R), radii 7.3, 6.5 m",
+    "car-side": "pi R1 R/(R1 + R) · R2 R/(R2 + R), radii 7.3, 6.5 m",
     "car-back": "the same, radii 1.4, 6.5 m",
     "truck-back": "pi R², an endless wall",
     "pole": "pi R² a/(a + R), an endless pole",
     "guard_rail": "3 crests and valleys, each pi R² r/(r + R), r = 15 mm",
-    "wall": "pi R² |Gamma|² of concrete",
+    "wall": "pi R² times the reflectivity of concrete",
 }
 TITLES = {
     "car-side": "car, left side",

@@ -91,7 +91,9 @@ def _polar(axes: Any, shape: str, circle: Circle, far: Circle | None) -> None:
     angle = circle.azimuth_deg
     axes.plot(*_closed(angle, np.maximum(dbsm(circle.rcs_m2), low)), color=NEAR, lw=0.7)
     if far is not None:
-        axes.plot(*_closed(angle, np.maximum(dbsm(_statistics(far).median_m2), low)), color=FAR, lw=1.2, ls="--")
+        beyond = _statistics(far)
+        level = np.maximum(dbsm(beyond.median_m2), low)
+        axes.plot(*_closed(beyond.angle_deg, level), color=FAR, lw=1.2, ls="--")
     axes.plot(*_closed(angle, np.maximum(dbsm(found.median_m2), low)), color=MEDIAN, lw=1.5)
     if shape in KIND:
         fine = np.arange(-180.0, 180.0)
@@ -112,9 +114,9 @@ def _flat(axes: Any, shape: str, circle: Circle, far: Circle | None) -> None:
                       label=f"{near}: 10 to 90 %, {window}")  # fmt: skip
     axes.plot(angle, dbsm(circle.rcs_m2), color=NEAR, lw=0.7, label=f"{near}: every aspect")
     if far is not None:
-        axes.plot(
-            angle, dbsm(_statistics(far).median_m2), color=FAR, lw=1.2, ls="--", label=f"far field: median, {window}"
-        )
+        beyond = _statistics(far)
+        label = f"far field: median, {window}"
+        axes.plot(beyond.angle_deg, dbsm(beyond.median_m2), color=FAR, lw=1.2, ls="--", label=label)
     axes.plot(angle, dbsm(found.median_m2), color=MEDIAN, lw=1.5, label=f"{near}: median, {window}")
     if shape in KIND:
         _pattern(axes, KIND[shape])
