@@ -1,0 +1,266 @@
+"""MCAP for Foxglove: clouds, transforms, maps, meshes and link budgets of a run, and a layout that opens the file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any
+
+from ..constants import DEFAULT_MOUNT_XYZ
+from ..frames import Pose
+from ..runs import Run, plain
+from . import mcap_messages as messages
+from .budget import budget_text, object_budgets
+from .layout import layout_json
+from .others import LidarClouds, RecordedClouds, lidar_clouds, recorded_clouds
+from .pictures import map_pictures
+from .points import detection_points
+from .poses import ScenePoses, mount_transforms, radar_frame
+from .scene_bodies import drawable, identity_ego
+from .source import EPOCH_S, ExportSource, RunFrame, RunRadar, open_run, stamp_ns
+from .target import require, whole_file
+
+__all__ = ["export_mcap", "layout_path"]
+
+_NUMBER: dict[str, Any] = {"type": "number"}
+_STRONGEST: dict[str, Any] = {
+    "title": "shenron_rt.Strongest",
+    "type": "object",
+    "properties": {
+        "frame": {"type": "integer"}, "range_m": _NUMBER, "azimuth_deg": _NUMBER, "velocity_mps": _NUMBER,
+        "snr_db": _NUMBER, "object_id": {"type": "integer"},
+    },
+}  # fmt: skip
+_OBJECTS: dict[str, Any] = {
+    "title": "shenron_rt.Objects",
+    "type": "object",
+    "properties": {
+        "frame": {"type": "integer"},
+        "objects": {"type": "array", "items": {"type": "object", "properties": {
+            "id": {"type": "integer"}, "name": {"type": "string"}, "tag": {"type": "string"},
+            "range_m": _NUMBER, "azimuth_deg": _NUMBER, "elevation_deg": _NUMBER, "velocity_mps": _NUMBER,
+            "tx_power_dbm": _NUMBER, "gain_db": _NUMBER, "pattern_db": _NUMBER, "spreading_db": _NUMBER,
+            "loss_db": _NUMBER, "rcs_dbsm": _NUMBER, "power_dbm": _NUMBER, "snr_db": {"type": ["number", "null"]},
+            "detected": {"type": "boolean"},
+        }}},
+    },
+}  # fmt: skip
+
+
+def layout_path(path: Path) -> Path:
+    """Return where the Foxglove layout of an MCAP file is written: ``drive.mcap`` has ``drive.layout.json``."""
+    return path.with_name(f"{path.stem}.layout.json")
+
+
+def export_mcap(
+    run: Run | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    radars: Sequence[str] | None = None,
+    frames: Collection[int] | None = None,
+    overwrite: bool = False,
+    epoch_s: int = EPOCH_S,
+    lidar: bool | None = None,
+    recorded: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None = None,
+    recorded_mount: Pose | None = None,
+    backend: str = "auto",
+    step: Callable[[str], None] | None = None,
+) -> Path:
+    """Write a run as one MCAP file with Foxglove's own schemas, and a layout beside it (:func:`layout_path`).
+
+    Parameters
+    ----------
+    run : Run or path
+        A run folder.
+    path : path
+        The file to make, ``.mcap``.
+    radars, frames : optional
+        Which of the run's. Default: all.
+    overwrite : bool
+        Replace files that are there.
+    epoch_s : int
+        Seconds since 1970 that scene second 0 is stamped with.
+    lidar : bool, optional
+        None: LiDAR points where the scene or the run has them; True: of a scene without a LiDAR a roof LiDAR at
+        (0, 0, 2.5) m is cast; False: none.
+    recorded : path or sequence of paths, optional
+        A recorded radar beside ours: a log of TI's demo, or CARLA's radar, one file or a folder of one a frame.
+    recorded_mount : Pose, optional
+        Where it was mounted in the ego frame. Default: (2, 0, 1) m.
+    backend : str
+        What casts LiDAR rays.
+    step : callable, optional
+        Told of each frame.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    NotFoundError, InputError
+        No such run, radar, frame or recording; foxglove-sdk is not installed; a place is taken; the disk refuses.
+    """
+    require("export to mcap", "foxglove", "mcap", "foxglove-sdk")
+    source, target = open_run(run, radars=radars, frames=frames), Path(path)
+    lidars = lidar_clouds(source, lidar, backend)
+    beside = recorded_clouds(recorded, recorded_mount or Pose(DEFAULT_MOUNT_XYZ))
+    with ExitStack() as stack:
+        staged = stack.enter_context(whole_file(target, overwrite=overwrite))
+        staged_layout = stack.enter_context(whole_file(layout_path(target), overwrite=overwrite))
+        with staged.open("xb") as file, _Recorder(file, epoch_s) as recorder:
+            _write(recorder, source, lidars, beside, step)
+            recorder.describe(source)
+        staged_layout.write_text(layout_json(source, recorder.topics), encoding="utf-8")
+    return target
+
+
+class _Recorder:
+    """An MCAP file being written, with a channel for every topic that came up.
+
+    Errors of the disk reach the caller as what they are: the library's writer turns them into RuntimeErrors.
+    """
+
+    def __init__(self, file: IO[bytes], epoch_s: int) -> None:
+        import foxglove
+        from foxglove.mcap import MCAPWriteOptions
+
+        self.epoch_s = epoch_s
+        self._file = _Sink(file)
+        self._context = foxglove.Context()  # of its own: the global one may have other listeners
+        options = MCAPWriteOptions(compression_threads=0)
+        self._writer = foxglove.open_mcap(self._file, context=self._context, writer_options=options)
+        self._channels: dict[str, Any] = {}
+
+    def __enter__(self) -> _Recorder:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        try:
+            self._writer.close()
+        except RuntimeError as error:
+            if exception[0] is None:
+                raise self._file.error or error from None
+        if self._file.error is not None:
+            raise self._file.error
+
+    @property
+    def topics(self) -> list[str]:
+        """Topics in the order they came up."""
+        return list(self._channels)
+
+    def stamp(self, time_s: float) -> int:
+        return stamp_ns(time_s, self.epoch_s)
+
+    def log(self, topic: str, kind: str, message: Any, stamp: int) -> None:
+        """Log a message of Foxglove's schema ``kind``."""
+        from foxglove import channels
+
+        if topic not in self._channels:
+            self._channels[topic] = getattr(channels, f"{kind}Channel")(topic, context=self._context)
+        self._send(topic, message, stamp)
+
+    def log_json(self, topic: str, schema: dict[str, Any], message: Mapping[str, Any], stamp: int) -> None:
+        """Log a JSON message with its schema."""
+        import foxglove
+
+        if topic not in self._channels:
+            self._channels[topic] = foxglove.Channel(topic, schema=schema, context=self._context)
+        self._send(topic, plain(message), stamp)
+
+    def describe(self, source: ExportSource) -> None:
+        """Write what the file was made from."""
+        self._writer.write_metadata(
+            "shenron_rt",
+            {
+                "run": source.name,
+                "made_from": source.kind,
+                "version": source.version,
+                "epoch_s": str(self.epoch_s),
+                "time_stamps": "epoch_s + scene seconds of mid-frame",
+            },
+        )
+
+    def _send(self, topic: str, message: Any, stamp: int) -> None:
+        self._channels[topic].log(message, log_time=stamp)
+        if self._file.error is not None:
+            raise self._file.error
+
+
+class _Sink:
+    """A file that remembers the error the library hides."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self.error: OSError | None = None
+
+    def write(self, data: bytes | bytearray) -> int:
+        try:
+            return self._file.write(data)
+        except OSError as error:
+            self.error = error
+            raise
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._file.seek(offset, whence)
+
+    def flush(self) -> None:
+        try:
+            self._file.flush()
+        except OSError as error:
+            self.error = error
+            raise
+
+
+def _write(
+    recorder: _Recorder,
+    source: ExportSource,
+    lidars: Sequence[LidarClouds],
+    beside: RecordedClouds | None,
+    step: Callable[[str], None] | None,
+) -> None:
+    poses = None if source.scene is None else ScenePoses(source.scene)
+    extra = [(other.frame, other.mount) for other in lidars if other.mount is not None]
+    if beside is not None:
+        extra.append((beside.frame, beside.mount))
+    mounts = mount_transforms(source, extra)
+    first_radar = source.radars[0].name
+    numbers = [f.index for f in source.radars[0].frames]
+    for count, (radar, frame) in enumerate(source.in_order()):
+        stamp = recorder.stamp(frame.mid_s)
+        moving = [] if poses is None else poses.bodies(frame.mid_s, moving=True)
+        ego = identity_ego() if poses is None else poses.ego(frame.mid_s)
+        placed = [ego, *mounts, *(b.pose for b in moving)]
+        recorder.log("/tf", "FrameTransforms", messages.transforms(placed, stamp), stamp)
+        if count == 0 and poses is not None:  # geometry once: bodies that move do so by the transform of their frame
+            bodies = drawable([*poses.bodies(frame.mid_s, moving=False), *moving])
+            recorder.log("/scene", "SceneUpdate", messages.scene_update(bodies, stamp), stamp)
+        _write_radar(recorder, source, radar, frame, stamp)
+        if radar.name == first_radar:  # what stands beside the radars comes once a frame
+            for other in lidars:
+                if (points := other.points(frame)) is not None:
+                    message = messages.cloud(points, other.frame, stamp)
+                    recorder.log(f"/lidar/{other.name}/points", "PointCloud", message, stamp)
+            if beside is not None and (points := beside.points(numbers.index(frame.index))) is not None:
+                message = messages.cloud(points, beside.frame, stamp)
+                recorder.log(f"/recorded/{beside.name}/points", "PointCloud", message, stamp)
+        if step is not None:
+            step(f"{radar.name} frame {frame.index}")
+
+
+def _write_radar(recorder: _Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
+    """Log what one radar made of one frame."""
+    topic, sensor = f"/radar/{radar.name}", radar_frame(radar.name)
+    points = detection_points(frame.detections())
+    recorder.log(f"{topic}/points", "PointCloud", messages.cloud(points, sensor, stamp), stamp)
+    for name, png in map_pictures(source, radar, frame).items():
+        recorder.log(f"{topic}/{name}", "CompressedImage", messages.image(png, sensor, stamp), stamp)
+    budgets = object_budgets(radar, frame, frame.returns())
+    text = budget_text(radar, frame, budgets)
+    recorder.log("/link_budget", "Log", messages.log_text(text, radar.name, stamp), stamp)
+    objects = {"frame": frame.index, "objects": [b.to_dict() for b in budgets]}
+    recorder.log_json(f"{topic}/objects", _OBJECTS, objects, stamp)
+    if frame.record.get("strongest") is not None:
+        recorder.log_json(f"{topic}/strongest", _STRONGEST, {"frame": frame.index, **frame.record["strongest"]}, stamp)
