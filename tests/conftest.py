@@ -42,3 +42,11 @@ def shared_data() -> Path:
 def rng() -> np.random.Generator:
     """Generator with a fixed seed."""
     return np.random.default_rng(20_250_101)
+
+
+@pytest.fixture(scope="session")
+def braking_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run folder of three frames of the scene ``braking``, few rays, no pictures."""
+    from export_tools import run_scene
+
+    return run_scene(tmp_path_factory.mktemp("runs") / "braking", "braking", "--frames", "0:3")

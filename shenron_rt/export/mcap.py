@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from ..constants import DEFAULT_MOUNT_XYZ
 from ..frames import Pose
-from ..runs import Run, plain
+from ..runs import Run
 from . import mcap_messages as messages
 from .budget import budget_text, object_budgets
 from .layout import layout_json
+from .mcap_recorder import Recorder
 from .others import LidarClouds, RecordedClouds, lidar_clouds, recorded_clouds
 from .pictures import map_pictures
 from .points import detection_points
 from .poses import ScenePoses, mount_transforms, radar_frame
 from .scene_bodies import drawable, identity_ego
-from .source import EPOCH_S, ExportSource, RunFrame, RunRadar, open_run, stamp_ns
+from .source import EPOCH_S, ExportSource, RunFrame, RunRadar, open_run
 from .target import require, whole_file
 
 __all__ = ["export_mcap", "layout_path"]
@@ -110,112 +111,15 @@ def export_mcap(
     with ExitStack() as stack:
         staged = stack.enter_context(whole_file(target, overwrite=overwrite))
         staged_layout = stack.enter_context(whole_file(layout_path(target), overwrite=overwrite))
-        with staged.open("xb") as file, _Recorder(file, epoch_s) as recorder:
+        with staged.open("xb") as file, Recorder(file, epoch_s) as recorder:
             _write(recorder, source, lidars, beside, step)
             recorder.describe(source)
         staged_layout.write_text(layout_json(source, recorder.topics), encoding="utf-8")
     return target
 
 
-class _Recorder:
-    """An MCAP file being written, with a channel for every topic that came up.
-
-    Errors of the disk reach the caller as what they are: the library's writer turns them into RuntimeErrors.
-    """
-
-    def __init__(self, file: IO[bytes], epoch_s: int) -> None:
-        import foxglove
-        from foxglove.mcap import MCAPWriteOptions
-
-        self.epoch_s = epoch_s
-        self._file = _Sink(file)
-        self._context = foxglove.Context()  # of its own: the global one may have other listeners
-        options = MCAPWriteOptions(compression_threads=0)
-        self._writer = foxglove.open_mcap(self._file, context=self._context, writer_options=options)
-        self._channels: dict[str, Any] = {}
-
-    def __enter__(self) -> _Recorder:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        try:
-            self._writer.close()
-        except RuntimeError as error:
-            if exception[0] is None:
-                raise self._file.error or error from None
-        if self._file.error is not None:
-            raise self._file.error
-
-    @property
-    def topics(self) -> list[str]:
-        """Topics in the order they came up."""
-        return list(self._channels)
-
-    def stamp(self, time_s: float) -> int:
-        return stamp_ns(time_s, self.epoch_s)
-
-    def log(self, topic: str, kind: str, message: Any, stamp: int) -> None:
-        """Log a message of Foxglove's schema ``kind``."""
-        from foxglove import channels
-
-        if topic not in self._channels:
-            self._channels[topic] = getattr(channels, f"{kind}Channel")(topic, context=self._context)
-        self._send(topic, message, stamp)
-
-    def log_json(self, topic: str, schema: dict[str, Any], message: Mapping[str, Any], stamp: int) -> None:
-        """Log a JSON message with its schema."""
-        import foxglove
-
-        if topic not in self._channels:
-            self._channels[topic] = foxglove.Channel(topic, schema=schema, context=self._context)
-        self._send(topic, plain(message), stamp)
-
-    def describe(self, source: ExportSource) -> None:
-        """Write what the file was made from."""
-        self._writer.write_metadata(
-            "shenron_rt",
-            {
-                "run": source.name,
-                "made_from": source.kind,
-                "version": source.version,
-                "epoch_s": str(self.epoch_s),
-                "time_stamps": "epoch_s + scene seconds of mid-frame",
-            },
-        )
-
-    def _send(self, topic: str, message: Any, stamp: int) -> None:
-        self._channels[topic].log(message, log_time=stamp)
-        if self._file.error is not None:
-            raise self._file.error
-
-
-class _Sink:
-    """A file that remembers the error the library hides."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-        self.error: OSError | None = None
-
-    def write(self, data: bytes | bytearray) -> int:
-        try:
-            return self._file.write(data)
-        except OSError as error:
-            self.error = error
-            raise
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        return self._file.seek(offset, whence)
-
-    def flush(self) -> None:
-        try:
-            self._file.flush()
-        except OSError as error:
-            self.error = error
-            raise
-
-
 def _write(
-    recorder: _Recorder,
+    recorder: Recorder,
     source: ExportSource,
     lidars: Sequence[LidarClouds],
     beside: RecordedClouds | None,
@@ -250,7 +154,7 @@ def _write(
             step(f"{radar.name} frame {frame.index}")
 
 
-def _write_radar(recorder: _Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
+def _write_radar(recorder: Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
     """Log what one radar made of one frame."""
     topic, sensor = f"/radar/{radar.name}", radar_frame(radar.name)
     points = detection_points(frame.detections())

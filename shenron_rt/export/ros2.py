@@ -20,7 +20,7 @@ from .scene_bodies import identity_ego
 from .source import EPOCH_S, ExportSource, open_run, stamp_ns
 from .target import require, whole_folder
 
-__all__ = ["export_ros2"]
+__all__ = ["export_ros2", "radar_topics"]
 
 _log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ def _ros_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]", "_", name)
 
 
-def _topics(names: Sequence[str]) -> dict[str, str]:
+def radar_topics(names: Sequence[str]) -> dict[str, str]:
     """Return the beginning of every radar's topics.
 
     Raises
@@ -134,7 +134,7 @@ def _topics(names: Sequence[str]) -> dict[str, str]:
 def _write(bag: _Bag, source: ExportSource, lidars: Sequence[LidarClouds], step: Callable[[str], None] | None) -> None:
     poses = None if source.scene is None else ScenePoses(source.scene)
     extra: list[tuple[str, Pose]] = [(other.frame, other.mount) for other in lidars if other.mount is not None]
-    topics = _topics([r.name for r in source.radars])
+    topics = radar_topics([r.name for r in source.radars])
     for count, (radar, frame) in enumerate(source.in_order()):
         stamp = stamp_ns(frame.mid_s, bag.epoch_s)
         moving = [] if poses is None else poses.bodies(frame.mid_s, moving=True)
