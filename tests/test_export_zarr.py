@@ -108,9 +108,10 @@ def test_labels_name_the_car_in_the_cell_of_its_detection(store: Path) -> None:
         for k in range(3):
             found = data.sel(frame=k)
             row = int(np.flatnonzero(found["detection_object_id"] == 101)[0])
-            where = {"range": found["detection_range"][row], "velocity": found["detection_velocity"][row]}
-            i = int(np.abs(data["range"] - where["range"]).argmin())
-            j = int(np.abs(data["velocity"] - where["velocity"]).argmin())
+            i, j = (
+                int(np.abs(data[axis].values - float(found[f"detection_{axis}"][row])).argmin())
+                for axis in ("range", "velocity")
+            )
             near = found["label_range_doppler"][i - 1 : i + 2, j - 1 : j + 2].values
             assert 101 in near
             assert NOTHING in found["label_range_doppler"].values
@@ -148,15 +149,17 @@ def test_folded_velocities_are_labelled_where_the_map_shows_them() -> None:
 
 
 def test_several_radars_are_groups_and_one_must_be_named(tmp_path: Path) -> None:
-    run = run_scene(tmp_path / "run", "clear_road", "--profile", "awrl1432", "--profile", "radarbook", rays=2_000)
+    run = run_scene(tmp_path / "run", "clear_road", "--profile", "awrl1432", "--profile", "awrl1432_137mhz", rays=2_000)
     assert main(["export", str(run), "--to", "zarr"]) == 0
     store = tmp_path / "run.zarr"
-    with pytest.raises(InputError, match=r"2 radars, say which: radar= one of \['front_awrl1432', 'front_radarbook'\]"):
+    with pytest.raises(
+        InputError, match=r"2 radars, say which: radar= one of \['front_awrl1432', 'front_awrl1432_137mhz'\]"
+    ):
         open_dataset(store)
     with pytest.raises(InputError, match="no radar 'rear'"):
         open_dataset(store, "rear")
-    with open_dataset(store, "front_radarbook") as data:
-        p = srt.load_profile("radarbook")
+    with open_dataset(store, "front_awrl1432_137mhz") as data:
+        p = srt.load_profile("awrl1432_137mhz")
         assert data["adc"].shape == (1, p.waveform.chirps, p.n_virtual, p.waveform.samples)
     with pytest.raises(NotFoundError, match="not a Zarr store"):
         open_dataset(run)

@@ -77,7 +77,7 @@ def export(
     options = _options(to, {name: value for name, value in given.items() if value is not None})
     numbers = None if frames is None else frame_range(frames)
     source = open_run(run, radars=radar, frames=numbers)
-    root = run.resolve()
+    root = run.absolute()
     target = output or root.with_name(f"{root.name}{_ENDINGS[to]}")
     common: dict[str, Any] = {"radars": radar, "frames": numbers, "overwrite": overwrite}
     started = clock.perf_counter()

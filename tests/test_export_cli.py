@@ -1,0 +1,259 @@
+"""``shenron-rt export``: places, refusals, options, and what stands beside our radars."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from export_tools import in_world, matrices, moved, read_mcap, run_scene, unpack
+
+import shenron_rt as srt
+from shenron_rt.cli import main
+from shenron_rt.io.recorded import PointCloud, write_ti_tlv
+
+#: format -> (module of its optional library or None, extra, default name of the export of a run "run")
+FORMATS = {
+    "mcap": ("foxglove", "mcap", "run.mcap"),
+    "ros2": ("rosbags", "ros", "run-ros2"),
+    "zarr": ("zarr", "data", "run.zarr"),
+    "pcd": (None, "", "run-pcd"),
+    "ply": (None, "", "run-ply"),
+    "csv": (None, "", "run-csv"),
+}
+
+
+@pytest.fixture
+def run(braking_run: Path, tmp_path: Path) -> Path:
+    """The run under the name ``run`` in a folder of its own."""
+    link = tmp_path / "place" / "run"
+    link.parent.mkdir()
+    link.symlink_to(braking_run)
+    return link
+
+
+AHEAD = np.array([1.0, 0.0, 0.0])
+
+
+def _needs(form: str) -> None:
+    library, extra, _ = FORMATS[form]
+    if library is not None:
+        pytest.importorskip(library, reason=f"{library} is not installed (extra {extra})")
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@contextmanager
+def _files_up_to(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond ``size`` bytes, as on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_full_disk_is_one_line_and_leaves_nothing_new_and_the_old_as_it_was(
+    form: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _needs(form)
+    words = ["export", str(run), "--to", form, "-o", str(tmp_path / "out" / "export")]
+    with _files_up_to(1_000):
+        assert main(words) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "export could not be written (File too large); nothing was left there" in said
+    assert list((tmp_path / "out").iterdir()) == []
+    assert main([*words, "--frames", "0:1"]) == 0
+    before = _contents(tmp_path / "out")
+    with _files_up_to(1_000):
+        assert main([*words, "--overwrite"]) == 2
+    assert _contents(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_an_export_that_is_there_is_kept_unless_overwritten(
+    form: str, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _needs(form)
+    words = ["export", str(run), "--to", form, "--frames", "0:1"]
+    assert main(words) == 0
+    place = run.parent / FORMATS[form][2]
+    assert place.exists()
+    here = place.parent if place.is_file() else place
+    before = _contents(place) if place.is_dir() else {place.name: place.read_bytes()}
+    capsys.readouterr()
+    assert main(words) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert {name: (here / name).read_bytes() for name in before} == before
+    assert main([*words[:-1], "1:2", "--overwrite"]) == 0
+    assert {name: (here / name).read_bytes() for name in before if (here / name).is_file()} != before
+    assert [p for p in place.parent.iterdir() if ".partial-" in p.name] == []
+
+
+@pytest.mark.parametrize("form", [f for f in FORMATS if f != "mcap"])
+def test_overwrite_replaces_no_folder_that_is_no_export(
+    form: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _needs(form)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/thesis.txt").write_text("years of work")
+    assert main(["export", str(run), "--to", form, "-o", str(tmp_path / "mine"), "--overwrite"]) == 2
+    assert "replaces exports of this kind only" in capsys.readouterr().err
+    assert _contents(tmp_path / "mine") == {"thesis.txt": b"years of work"}
+
+
+@pytest.mark.parametrize("form", [f for f, (library, _, _) in FORMATS.items() if library])
+def test_a_missing_library_is_named_with_the_command_that_installs_it(
+    form: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library, extra, _ = FORMATS[form]
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == library else real(name, *a))
+    assert main(["export", str(run), "--to", form, "-o", str(tmp_path / "export")]) == 2
+    assert f"pip install 'shenron-rt[{extra}]'" in capsys.readouterr().err
+    assert not (tmp_path / "export").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--to", "csv", "--radar", "rear"], "no radar 'rear'; known: front"),
+        (["--to", "csv", "--frames", "7:9"], "no frames of 7:9; it has 0:3"),
+        (["--to", "csv", "--lidar"], "--lidar: --to csv has no such option; it is for mcap and ros2"),
+        (["--to", "zarr", "--text"], "--text: --to zarr has no such option; it is for pcd and ply"),
+        (["--to", "mcap", "--recorded", "nothing.dat"], "nothing.dat: no such file"),
+        (["--to", "mcap", "--recorded-mount", "1,0,1"], "--recorded-mount: give the recording too"),
+        (["--to", "usd"], "usd"),
+    ],
+)
+def test_refusals_are_one_line_with_what_is_allowed(
+    words: list[str], says: str, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _needs("mcap")
+    assert main(["export", str(run), *words]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert says in said
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(tmp_path), "--to", "csv"]) == 2
+    assert "not a run folder" in capsys.readouterr().err
+
+
+def test_json_says_what_was_written_and_nothing_else(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert main(["export", str(run), "--to", "csv", "-o", str(run.parent / "x"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "to": "csv", "path": str(run.parent / "x"), "frames": 3, "radars": ["front"],
+    }  # fmt: skip
+
+
+# ---- what stands beside our radars
+def _export_mcap(run: Path, target: Path, *options: str) -> dict[str, list[Any]]:
+    _needs("mcap")
+    assert main(["export", str(run), "--to", "mcap", "-o", str(target), *options]) == 0
+    return read_mcap(target)
+
+
+def test_carlas_radar_stands_beside_ours_frame_by_frame(run: Path, tmp_path: Path) -> None:
+    # velocity, azimuth (+ right), altitude, depth
+    rows = np.array([[-5.0, 0.1, 0.02, 25.0], [1.0, -0.3, 0.0, 12.0]], dtype=np.float32)
+    for k in range(2):
+        np.save(tmp_path / f"radar_{k:08d}.npy", rows + np.array([0, 0, 0, k]))
+    files = [str(tmp_path / f"radar_{k:08d}.npy") for k in range(2)]
+    options = [w for f in files for w in ("--recorded", f)]
+    found = _export_mcap(run, tmp_path / "a.mcap", *options, "--recorded-mount", "1,0.5,0.8,10,0,0")
+    assert len(found["/recorded/radar/points"]) == 2  # the recording ends before the run
+    for k, entry in enumerate(found["/recorded/radar/points"]):
+        columns, depth = unpack(entry.message), rows[:, 3].astype(float) + k
+        azimuth, altitude = -rows[:, 1].astype(float), rows[:, 2].astype(float)
+        assert entry.time == found["/radar/front/points"][k].time
+        wanted = depth * [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
+        np.testing.assert_allclose([columns[a] for a in "xyz"], wanted, rtol=1e-6)
+        np.testing.assert_array_equal(columns["velocity"], rows[:, 0])
+        assert np.isnan(columns["snr_db"]).all()
+    tree = matrices(found["/tf"][0].message)
+    mount = np.linalg.inv(in_world(tree, "ego")) @ in_world(tree, "recorded/radar")
+    np.testing.assert_allclose(mount[:3, 3], [1, 0.5, 0.8], atol=1e-12)
+    assert np.degrees(np.arctan2(mount[1, 0], mount[0, 0])) == pytest.approx(10)
+
+
+def test_a_log_of_tis_demo_stands_beside_ours(run: Path, tmp_path: Path) -> None:
+    position = np.array([[20.0, 3.0, 0.5], [8.0, -1.0, 0.0]])
+    clouds = [
+        PointCloud(position + k * AHEAD, np.array([-3.0, 0.5]), np.array([20.0, 15.0]), np.full(2, 10.0), frame=k)
+        for k in range(3)
+    ]
+    write_ti_tlv(tmp_path / "board.dat", clouds)
+    found = _export_mcap(run, tmp_path / "a.mcap", "--recorded", str(tmp_path / "board.dat"), "--frames", "1:3")
+    entries = found["/recorded/board/points"]
+    assert len(entries) == 2
+    for k, entry in enumerate(entries):
+        columns = unpack(entry.message)
+        np.testing.assert_allclose(np.column_stack([columns[a] for a in "xyz"]), position + k * AHEAD, atol=1e-5)
+        np.testing.assert_array_equal(columns["snr_db"], [20, 15])
+
+
+def test_a_lidar_run_brings_its_own_points_and_default_mounts(tmp_path: Path) -> None:
+    assert main(["cast-lidar", "braking", "-o", str(tmp_path / "cast"), "--layout", "ply", "--frames", "0:2"]) == 0
+    files = [str(tmp_path / f"cast/frame_{k:06d}.ply") for k in range(2)]
+    words = ["lidar", *files, "--tag-table", "0.9.14", "--frame", "carla", "--side-file", str(tmp_path / "cast")]
+    assert main([*words, "-o", str(tmp_path / "run"), "--no-pictures"]) == 0
+    found = _export_mcap(tmp_path / "run", tmp_path / "a.mcap")
+    times = [m.time for m in found["/radar/awrl1432/points"]]
+    assert times[1] - times[0] == 100_000_000  # LiDAR files do not say when they were: a tenth of a second apart
+    tree = matrices(found["/tf"][0].message)
+    np.testing.assert_allclose(in_world(tree, "radar/awrl1432")[:3, 3], [2, 0, 1])
+    entry = found["/lidar/points/points"][0].message
+    columns = unpack(entry)
+    points = moved(in_world(tree, entry.frame_id), np.column_stack([columns[a] for a in "xyz"]).astype(float))
+    road = columns["tag"] == int(srt.SemanticTag.Roads)
+    assert road.sum() > 100
+    # a LiDAR 2.5 m above the road: its points lie on it in the ego frame, in CARLA's float32
+    assert np.abs(points[road, 2]).max() < 1e-4
+
+
+def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:
+    run = run_scene(tmp_path / "run", "braking", "--profile", "awrl1432", "--profile", "awrl1432_137mhz", rays=2_000)
+    found = _export_mcap(run, tmp_path / "a.mcap", "--lidar")
+    for name in ("front_awrl1432", "front_awrl1432_137mhz"):
+        (entry,) = found[f"/radar/{name}/points"]
+        at = [i for i, m in enumerate(found["/tf"]) if m.time == entry.time]
+        assert at  # each radar has transforms of its own mid-frame
+        assert f"radar/{name}" in matrices(found["/tf"][at[0]].message)
+    assert (len(found["/tf"]), len(found["/scene"]), len(found["/lidar/roof/points"])) == (2, 1, 1)
+
+
+def test_more_triangles_than_a_viewer_takes_leave_the_largest_body_out(caplog: pytest.LogCaptureFixture) -> None:
+    from shenron_rt.export.poses import ScenePoses
+    from shenron_rt.export.scene_bodies import drawable
+
+    bodies = ScenePoses(srt.load_scene("braking")).bodies(0.0, moving=False)
+    bodies += ScenePoses(srt.load_scene("braking")).bodies(0.0, moving=True)
+    assert [b.label for b in drawable(bodies)] == ["road", "left_wall", "right_wall", "lead"]
+    assert [b.label for b in drawable(bodies, limit=30)] == ["road", "left_wall", "right_wall"]
+    assert "the viewer gets no mesh of lead" in caplog.text
+
+
+def test_a_body_that_bends_is_refused() -> None:
+    from shenron_rt.errors import InputError
+    from shenron_rt.export.poses import rigid_fit
+
+    rng = np.random.default_rng(1)
+    own = rng.normal(size=(40, 3))
+    seen = own.copy()
+    seen[7] += 1e-3
+    with pytest.raises(InputError, match="body/walker: its vertices are up to"):
+        rigid_fit(own, seen, child="body/walker")
