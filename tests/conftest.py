@@ -45,8 +45,10 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture(scope="session")
-def braking_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run folder of three frames of the scene ``braking``, few rays, no pictures."""
-    from export_tools import run_scene
+def street_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run folder of three frames of a street with a car ahead, few rays, no pictures."""
+    from export_tools import STREET, run_scene
 
-    return run_scene(tmp_path_factory.mktemp("runs") / "braking", "braking", "--frames", "0:3")
+    folder = tmp_path_factory.mktemp("street")
+    (folder / "street.yaml").write_text(STREET, encoding="utf-8")
+    return run_scene(folder / "run", str(folder / "street.yaml"), "--frames", "0:3")

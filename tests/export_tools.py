@@ -14,6 +14,21 @@ import pytest
 
 from shenron_rt.cli import main
 
+#: Two vehicles at 15 and 10 m/s between walls: where everything is at any time is known in closed form.
+STREET = """
+version: 1
+name: street
+seed: 7
+ego: {velocity_mps: [15, 0, 0]}
+static:
+  - {name: road, shape: "ground:220x40", xyz_m: [116, 0, 0], tag: Roads, material: asphalt}
+  - {name: left_wall, shape: "box:80x0.3x3", xyz_m: [43, 4.15, 1.5], tag: Walls, material: concrete, id: 40}
+  - {name: right_wall, shape: "box:80x0.3x3", xyz_m: [43, -4.15, 1.5], tag: Walls, material: concrete, id: 41}
+actors:
+  - {id: 101, name: lead, shape: car, xyz_m: [29.25, 0, 0], velocity_mps: [10, 0, 0], aim: 20000}
+radars:
+  - {name: front, profile: awrl1432}
+"""
 EPOCH_NS = 1_000_000_000 * 10**9
 
 

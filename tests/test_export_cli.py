@@ -30,11 +30,11 @@ FORMATS = {
 
 
 @pytest.fixture
-def run(braking_run: Path, tmp_path: Path) -> Path:
+def run(street_run: Path, tmp_path: Path) -> Path:
     """The run under the name ``run`` in a folder of its own."""
     link = tmp_path / "place" / "run"
     link.parent.mkdir()
-    link.symlink_to(braking_run)
+    link.symlink_to(street_run)
     return link
 
 
@@ -226,7 +226,7 @@ def test_a_lidar_run_brings_its_own_points_and_default_mounts(tmp_path: Path) ->
 
 
 def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:
-    run = run_scene(tmp_path / "run", "braking", "--profile", "awrl1432", "--profile", "awrl1432_137mhz", rays=2_000)
+    run = run_scene(tmp_path / "run", "clear_road", "--profile", "awrl1432", "--profile", "awrl1432_137mhz", rays=2_000)
     found = _export_mcap(run, tmp_path / "a.mcap", "--lidar")
     for name in ("front_awrl1432", "front_awrl1432_137mhz"):
         (entry,) = found[f"/radar/{name}/points"]
@@ -236,12 +236,46 @@ def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:
     assert (len(found["/tf"]), len(found["/scene"]), len(found["/lidar/roof/points"])) == (2, 1, 1)
 
 
-def test_more_triangles_than_a_viewer_takes_leave_the_largest_body_out(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_run_that_kept_maps_and_detections_only_gives_the_same_pictures_and_maps(
+    street_run: Path, tmp_path: Path
+) -> None:
+    _needs("mcap")
+    _needs("zarr")
+    from shenron_rt.export import open_dataset
+
+    source, lean = street_run / "radars/front/frame_000000", tmp_path / "lean/radars/front/frame_000000"
+    lean.mkdir(parents=True)
+    with np.load(source / "cube.npz") as cube:
+        np.savez(lean / "maps.npz", **{name: cube[name] for name in ("range_doppler", "range_azimuth")})
+    (lean / "detections.csv").write_bytes((source / "detections.csv").read_bytes())
+    # the truth that pictures are labelled with
+    (lean / "returns.npz").write_bytes((source / "returns.npz").read_bytes())
+    summary = json.loads((street_run / "summary.json").read_text())
+    summary["radars"][0]["frames"] = summary["radars"][0]["frames"][:1]
+    (tmp_path / "lean/summary.json").write_text(json.dumps(summary))
+    (tmp_path / "lean/config.yaml").write_bytes((street_run / "config.yaml").read_bytes())
+    full, less = (
+        _export_mcap(folder, tmp_path / f"{folder.name}.mcap", "--frames", "0:1")
+        for folder in (street_run, tmp_path / "lean")
+    )
+    for name in ("range_doppler", "range_azimuth"):
+        topic = f"/radar/front/{name}"
+        assert less[topic][0].message.data == full[topic][0].message.data
+    assert main(["export", str(tmp_path / "lean"), "--to", "zarr"]) == 0
+    with open_dataset(tmp_path / "lean.zarr") as data, np.load(source / "cube.npz") as cube:
+        assert "adc" not in data
+        np.testing.assert_array_equal(data["range_azimuth"][0], cube["range_azimuth"].astype(np.float32))
+        np.testing.assert_array_equal(data["velocity"], cube["velocity_mps"])
+
+
+def test_more_triangles_than_a_viewer_takes_leave_the_largest_body_out(
+    run: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     from shenron_rt.export.poses import ScenePoses
     from shenron_rt.export.scene_bodies import drawable
 
-    bodies = ScenePoses(srt.load_scene("braking")).bodies(0.0, moving=False)
-    bodies += ScenePoses(srt.load_scene("braking")).bodies(0.0, moving=True)
+    poses = ScenePoses(srt.load_scene(run / "config.yaml"))
+    bodies = poses.bodies(0.0, moving=False) + poses.bodies(0.0, moving=True)
     assert [b.label for b in drawable(bodies)] == ["road", "left_wall", "right_wall", "lead"]
     assert [b.label for b in drawable(bodies, limit=30)] == ["road", "left_wall", "right_wall"]
     assert "the viewer gets no mesh of lead" in caplog.text

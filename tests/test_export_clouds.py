@@ -32,9 +32,9 @@ def _export(run: Path, folder: Path, form: str, *options: str) -> list[tuple[Pat
 
 
 @pytest.mark.parametrize("text", [False, True])
-def test_pcd_files_read_back_with_pypcd4(text: bool, braking_run: Path, tmp_path: Path) -> None:
+def test_pcd_files_read_back_with_pypcd4(text: bool, street_run: Path, tmp_path: Path) -> None:
     pypcd4 = pytest.importorskip("pypcd4", reason="pypcd4 is not installed (extra test)")
-    pairs = _export(braking_run, tmp_path / "pcd", "pcd", *(["--text"] if text else []))
+    pairs = _export(street_run, tmp_path / "pcd", "pcd", *(["--text"] if text else []))
     assert len(pairs) == 3
     for file, table in pairs:
         cloud = pypcd4.PointCloud.from_path(file)
@@ -46,10 +46,10 @@ def test_pcd_files_read_back_with_pypcd4(text: bool, braking_run: Path, tmp_path
 
 
 @pytest.mark.parametrize("text", [False, True])
-def test_ply_files_read_back_with_trimesh(text: bool, braking_run: Path, tmp_path: Path) -> None:
+def test_ply_files_read_back_with_trimesh(text: bool, street_run: Path, tmp_path: Path) -> None:
     import trimesh
 
-    for file, table in _export(braking_run, tmp_path / "ply", "ply", *(["--text"] if text else [])):
+    for file, table in _export(street_run, tmp_path / "ply", "ply", *(["--text"] if text else [])):
         cloud = trimesh.load(file)
         xyz = np.column_stack([table[a] for a in "xyz"]).astype(np.float32)
         np.testing.assert_array_equal(cloud.vertices, xyz)
@@ -59,16 +59,16 @@ def test_ply_files_read_back_with_trimesh(text: bool, braking_run: Path, tmp_pat
             np.testing.assert_array_equal(column, table[name].astype(DETECTION_POINT[name]), err_msg=name)
 
 
-def test_csv_files_are_the_runs_tables(braking_run: Path, tmp_path: Path) -> None:
-    for file, table in _export(braking_run, tmp_path / "csv", "csv"):
+def test_csv_files_are_the_runs_tables(street_run: Path, tmp_path: Path) -> None:
+    for file, table in _export(street_run, tmp_path / "csv", "csv"):
         read = np.genfromtxt(file, delimiter=",", names=True)
         assert read.dtype.names == table.dtype.names
         for name in table.dtype.names:
             np.testing.assert_array_equal(np.atleast_1d(read[name]), table[name].astype(float), err_msg=name)
 
 
-def test_the_index_says_when_and_from_where(braking_run: Path, tmp_path: Path) -> None:
-    _export(braking_run, tmp_path / "csv", "csv", "--frames", "1:3")
+def test_the_index_says_when_and_from_where(street_run: Path, tmp_path: Path) -> None:
+    _export(street_run, tmp_path / "csv", "csv", "--frames", "1:3")
     frames = json.loads((tmp_path / "csv/export.json").read_text())["frames"]
     mid = srt.load_profile("awrl1432").frame_mid_s
     assert [f["frame"] for f in frames] == [1, 2]

@@ -16,9 +16,9 @@ pytest.importorskip("foxglove", reason="foxglove-sdk is not installed (extra mca
 
 
 @pytest.fixture(scope="module")
-def drive(braking_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drive(street_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("layout") / "drive.mcap"
-    assert main(["export", str(braking_run), "--to", "mcap", "-o", str(path), "--lidar"]) == 0
+    assert main(["export", str(street_run), "--to", "mcap", "-o", str(path), "--lidar"]) == 0
     return path
 
 

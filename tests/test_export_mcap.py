@@ -22,9 +22,9 @@ Messages = dict[str, list[Any]]
 
 
 @pytest.fixture(scope="module")
-def drive(braking_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drive(street_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("mcap") / "drive.mcap"
-    assert main(["export", str(braking_run), "--to", "mcap", "-o", str(path), "--lidar"]) == 0
+    assert main(["export", str(street_run), "--to", "mcap", "-o", str(path), "--lidar"]) == 0
     return path
 
 
@@ -61,8 +61,8 @@ def test_time_stamps_are_scene_seconds_of_mid_frame_after_the_fixed_epoch(read: 
     assert {t.timestamp.ToNanoseconds() for t in read["/tf"][2].message.transforms} == {wanted[2]}
 
 
-def test_radar_clouds_hold_the_detections_of_the_run(braking_run: Path, read: Messages) -> None:
-    for folder, entry in zip(_frames(braking_run), read["/radar/front/points"], strict=True):
+def test_radar_clouds_hold_the_detections_of_the_run(street_run: Path, read: Messages) -> None:
+    for folder, entry in zip(_frames(street_run), read["/radar/front/points"], strict=True):
         assert entry.message.frame_id == "radar/front"
         columns, table = unpack(entry.message), srt.Detections.from_csv(folder / "detections.csv").table
         assert list(columns) == ["x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "object_id", "tag"]
@@ -74,11 +74,11 @@ def test_radar_clouds_hold_the_detections_of_the_run(braking_run: Path, read: Me
 
 
 def test_transforms_put_hit_points_on_the_mesh_and_detections_within_a_range_cell(
-    braking_run: Path, read: Messages
+    street_run: Path, read: Messages
 ) -> None:
     (car,) = [e for e in read["/scene"][0].message.entities if e.id == "lead"]
     assert (car.frame_id, car.frame_locked) == ("body/lead", True)
-    for k, folder in enumerate(_frames(braking_run)):
+    for k, folder in enumerate(_frames(street_run)):
         tree = matrices(read["/tf"][k].message)
         to_car = np.linalg.inv(in_world(tree, "body/lead")) @ in_world(tree, "radar/front")
         hits = srt.Scatterers.load(folder / "scatterers.npz")
@@ -135,8 +135,8 @@ def test_pictures_are_png_of_the_size_that_plot_draws(read: Messages) -> None:
         assert pixels[..., :3].std() > 0.05  # something is drawn
 
 
-def test_link_budget_adds_up_and_is_that_of_the_run(braking_run: Path, read: Messages) -> None:
-    summary = json.loads((braking_run / "summary.json").read_text())["radars"][0]["frames"]
+def test_link_budget_adds_up_and_is_that_of_the_run(street_run: Path, read: Messages) -> None:
+    summary = json.loads((street_run / "summary.json").read_text())["radars"][0]["frames"]
     for record, entry, text in zip(summary, read["/radar/front/objects"], read["/link_budget"], strict=True):
         objects = {o["id"]: o for o in entry.message["objects"]}
         assert set(objects) == {o["id"] for o in record["objects"] if o["id"]}
@@ -158,8 +158,8 @@ def test_link_budget_adds_up_and_is_that_of_the_run(braking_run: Path, read: Mes
     assert (car["gain_db"], car["tx_power_dbm"]) == (12.0, 10.0)
 
 
-def test_strongest_is_that_of_the_summary(braking_run: Path, read: Messages) -> None:
-    summary = json.loads((braking_run / "summary.json").read_text())["radars"][0]["frames"]
+def test_strongest_is_that_of_the_summary(street_run: Path, read: Messages) -> None:
+    summary = json.loads((street_run / "summary.json").read_text())["radars"][0]["frames"]
     for record, entry in zip(summary, read["/radar/front/strongest"], strict=True):
         assert entry.message == {"frame": record["frame"], **record["strongest"]}
 
@@ -201,10 +201,10 @@ def test_a_turning_ego_keeps_points_on_turning_and_static_bodies(tmp_path: Path)
             assert distance_to_mesh(entity, moved(to_body, own[:: len(own) // 20])).max() < 1e-6
 
 
-def test_the_same_run_gives_the_same_bytes(braking_run: Path, tmp_path: Path) -> None:
+def test_the_same_run_gives_the_same_bytes(street_run: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert (
-            main(["export", str(braking_run), "--to", "mcap", "--frames", "0:1", "-o", str(tmp_path / f"{name}.mcap")])
+            main(["export", str(street_run), "--to", "mcap", "--frames", "0:1", "-o", str(tmp_path / f"{name}.mcap")])
             == 0
         )
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()

@@ -21,9 +21,9 @@ KINDS = {2: "u1", 5: "<i4", 7: "<f4"}
 
 
 @pytest.fixture(scope="module")
-def bag(braking_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bag(street_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("ros2") / "bag"
-    assert main(["export", str(braking_run), "--to", "ros2", "-o", str(folder), "--lidar"]) == 0
+    assert main(["export", str(street_run), "--to", "ros2", "-o", str(folder), "--lidar"]) == 0
     return folder
 
 
@@ -68,9 +68,9 @@ def test_topics_types_and_counts(read: dict[str, list[Any]], bag: Path) -> None:
     assert yaml.safe_load(static["topic_metadata"]["offered_qos_profiles"])[0]["durability"] == 1
 
 
-def test_clouds_and_scans_hold_the_detections_of_the_run(braking_run: Path, read: dict[str, list[Any]]) -> None:
+def test_clouds_and_scans_hold_the_detections_of_the_run(street_run: Path, read: dict[str, list[Any]]) -> None:
     for k, (time, _, cloud) in enumerate(read["/radar/front/points"]):
-        table = srt.Detections.from_csv(braking_run / f"radars/front/frame_{k:06d}/detections.csv").table
+        table = srt.Detections.from_csv(street_run / f"radars/front/frame_{k:06d}/detections.csv").table
         assert cloud.header.frame_id == "radar/front"
         assert (cloud.height, cloud.width, cloud.row_step) == (1, len(table), cloud.point_step * len(table))
         assert cloud.header.stamp.sec * 10**9 + cloud.header.stamp.nanosec == time

@@ -25,9 +25,9 @@ ULP = 2.0**-24
 
 
 @pytest.fixture(scope="module")
-def store(braking_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("zarr") / "braking.zarr"
-    assert main(["export", str(braking_run), "--to", "zarr", "-o", str(path)]) == 0
+def store(street_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("zarr") / "street.zarr"
+    assert main(["export", str(street_run), "--to", "zarr", "-o", str(path)]) == 0
     return path
 
 
@@ -35,7 +35,7 @@ def _folder(run: Path, k: int) -> Path:
     return run / f"radars/front/frame_{k:06d}"
 
 
-def test_cubes_and_maps_are_those_of_the_run_with_named_dimensions(braking_run: Path, store: Path) -> None:
+def test_cubes_and_maps_are_those_of_the_run_with_named_dimensions(street_run: Path, store: Path) -> None:
     with open_dataset(store) as data:
         assert data["adc"].dims == ("frame", *srt.AdcCube.dims)
         assert data["range_doppler"].dims == ("frame", "range", "velocity")
@@ -43,7 +43,7 @@ def test_cubes_and_maps_are_those_of_the_run_with_named_dimensions(braking_run: 
         assert data["frame"].values.tolist() == [0, 1, 2]
         for k in range(3):
             adc, cube = (
-                c.load(_folder(braking_run, k) / f) for c, f in ((srt.AdcCube, "adc.npz"), (srt.RadarCube, "cube.npz"))
+                c.load(_folder(street_run, k) / f) for c, f in ((srt.AdcCube, "adc.npz"), (srt.RadarCube, "cube.npz"))
             )
             stored = data["adc"].sel(frame=k).values
             assert stored.dtype == np.complex64
@@ -59,19 +59,19 @@ def test_cubes_and_maps_are_those_of_the_run_with_named_dimensions(braking_run: 
         np.testing.assert_allclose(data["time_s"], 0.1 * np.arange(3) + adc.profile.frame_mid_s, rtol=1e-15)
 
 
-def test_a_chunk_is_a_frame_and_the_attributes_carry_the_profile(braking_run: Path, store: Path) -> None:
+def test_a_chunk_is_a_frame_and_the_attributes_carry_the_profile(street_run: Path, store: Path) -> None:
     group = zarr.open_group(store, mode="r")["front"]
     assert group["adc"].chunks == (1, *group["adc"].shape[1:])
     assert group["adc"].metadata.dimension_names == ("frame", "chirp", "antenna", "sample")
     assert group["range_doppler"].attrs["units"] == "W"
     profile = srt.RadarProfile.model_validate(group.attrs["profile"])
-    assert profile == srt.AdcCube.load(_folder(braking_run, 0) / "adc.npz").profile
+    assert profile == srt.AdcCube.load(_folder(street_run, 0) / "adc.npz").profile
     assert group.attrs["mount_xyz_m"] == [2.0, 0.0, 1.0]
 
 
-def test_detections_are_padded_to_the_longest_frame(braking_run: Path, store: Path) -> None:
+def test_detections_are_padded_to_the_longest_frame(street_run: Path, store: Path) -> None:
     with open_dataset(store) as data:
-        tables = [srt.Detections.from_csv(_folder(braking_run, k) / "detections.csv").table for k in range(3)]
+        tables = [srt.Detections.from_csv(_folder(street_run, k) / "detections.csv").table for k in range(3)]
         assert data["n_detections"].values.tolist() == [len(t) for t in tables]
         assert data.sizes["detection"] == max(len(t) for t in tables)
         for k, table in enumerate(tables):
@@ -84,8 +84,8 @@ def test_detections_are_padded_to_the_longest_frame(braking_run: Path, store: Pa
         assert (padding["detection_object_id"] == -1).all()
 
 
-def test_objects_are_those_of_the_summary(braking_run: Path, store: Path) -> None:
-    frames = json.loads((braking_run / "summary.json").read_text())["radars"][0]["frames"]
+def test_objects_are_those_of_the_summary(street_run: Path, store: Path) -> None:
+    frames = json.loads((street_run / "summary.json").read_text())["radars"][0]["frames"]
     with open_dataset(store) as data:
         assert dict(zip(data["object"].values.tolist(), data["object_name"].values.tolist(), strict=True)) == {
             0: "static", 40: "left_wall", 41: "right_wall", 101: "lead",
@@ -165,8 +165,8 @@ def test_several_radars_are_groups_and_one_must_be_named(tmp_path: Path) -> None
         open_dataset(run)
 
 
-def test_a_run_of_adc_data_has_no_truth(braking_run: Path, tmp_path: Path) -> None:
-    adc: Any = np.load(_folder(braking_run, 0) / "adc.npz")["data"]
+def test_a_run_of_adc_data_has_no_truth(street_run: Path, tmp_path: Path) -> None:
+    adc: Any = np.load(_folder(street_run, 0) / "adc.npz")["data"]
     np.save(tmp_path / "cubes.npy", np.stack([adc, adc]))
     words = [
         "process",

@@ -90,7 +90,7 @@ def scene_update(bodies: Sequence[PlacedBody], stamp: int) -> Any:
             SceneEntity(
                 timestamp=timestamp(stamp), frame_id=placed.frame, id=placed.label, frame_locked=True,
                 metadata=[KeyValuePair(key="object_id", value=str(placed.body.object_id))],
-                triangles=[_triangles(placed, tag) for tag in np.unique(placed.body.tag)],
+                triangles=[_triangles(placed, tag) for tag in np.unique(placed.body.tag[placed.faces])],
             )
             for placed in bodies
         ]
@@ -102,7 +102,7 @@ def _triangles(placed: PlacedBody, tag: np.integer[Any]) -> Any:
     from foxglove.messages import Color, Point3, Pose, TriangleListPrimitive
 
     body = placed.body
-    faces = body.mesh.faces[body.tag == tag]
+    faces = body.mesh.faces[placed.faces[body.tag[placed.faces] == tag]]
     used, index = np.unique(faces, return_inverse=True)
     points = [Point3(x=x, y=y, z=z) for x, y, z in body.mesh.vertices[used].tolist()]
     known = int(tag) in SemanticTag._value2member_map_

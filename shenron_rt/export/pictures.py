@@ -5,15 +5,12 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
-from .source import ExportSource, RunFrame, RunRadar
+from .source import MAPS, ExportSource, RunFrame, RunRadar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["MAPS", "map_pictures"]
-
-#: Maps that are exported; each is ``<map>.png`` in the folder of a frame.
-MAPS = ("range_doppler", "range_azimuth")
+__all__ = ["map_pictures"]
 
 
 def map_pictures(source: ExportSource, radar: RunRadar, frame: RunFrame) -> dict[str, bytes]:
@@ -24,7 +21,7 @@ def map_pictures(source: ExportSource, radar: RunRadar, frame: RunFrame) -> dict
     drawn = {name: frame.folder / f"{name}.png" for name in MAPS}
     if all(file.is_file() for file in drawn.values()):
         return {name: file.read_bytes() for name, file in drawn.items()}
-    cube = frame.cube()
+    cube = frame.cube(radar.profile)
     if cube is None:
         return {}
     from ..plot import birds_eye, range_doppler

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._typing import FloatArray
+from .._typing import FloatArray, IntArray
 from ..config._base import Placed
 from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Scene, StaticPart
@@ -61,9 +61,9 @@ class Transform:
         return Transform(self.parent, child.child, self.rotation @ child.rotation, origin)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlacedBody:
-    """A body of the scene with the name of its frame.
+    """A body of the scene, or a part of one that moves by itself, with the name of its frame.
 
     Parameters
     ----------
@@ -74,12 +74,15 @@ class PlacedBody:
     body : Body
     pose : Transform
         At the instant that was asked for.
+    faces : (f,) int
+        Rows of the body's mesh that this is.
     """
 
     frame: str
     label: str
     body: Body
     pose: Transform
+    faces: IntArray
 
 
 class ScenePoses:
@@ -102,12 +105,12 @@ class ScenePoses:
         return _ego(self._world(time_s, (), load_materials(self.scene.materials)))
 
     def bodies(self, time_s: float, *, moving: bool) -> list[PlacedBody]:
-        """Return the moving or the static bodies as they stand in the world at that scene time.
+        """Return the moving or the static bodies as they stand in the world at that scene time, part by part.
 
         Raises
         ------
         InputError
-            A body that is no rigid copy of its mesh.
+            A part that is no rigid copy of its mesh.
         """
         everything, materials = self._loaded
         labels = _labels(everything)
@@ -118,9 +121,12 @@ class ScenePoses:
         placed = []
         for row, (k, body) in enumerate(zip(chosen, bodies, strict=True)):
             seen = world.vertices[world.vertex_start[row] : world.vertex_start[row + 1]]
-            label = labels[k]
-            local = rigid_fit(body.mesh.vertices, seen, child=f"body/{label}")
-            placed.append(PlacedBody(f"body/{label}" if moving else WORLD, label, body, ego.then(local)))
+            for name, faces in _rigid_parts(body):
+                label = f"{labels[k]}/{name}" if name else labels[k]
+                used = np.unique(body.mesh.faces[faces])
+                local = rigid_fit(body.mesh.vertices[used], seen[used], child=f"body/{label}")
+                frame = f"body/{label}" if moving else WORLD
+                placed.append(PlacedBody(frame, label, body, ego.then(local), faces))
         return placed
 
     def _world(self, time_s: float, bodies: tuple[Body, ...], materials: MaterialTable) -> World:
@@ -130,6 +136,17 @@ class ScenePoses:
 
 def _ego(world: World) -> Transform:
     return Transform(WORLD, EGO, world.radar_state.rotation, world.radar_state.origin)
+
+
+def _rigid_parts(body: Body) -> list[tuple[str, IntArray]]:
+    """Return name and faces of every part of a body that is rigid in itself; the body proper has no name."""
+    face_link = np.asarray(getattr(body, "face_link", np.zeros(body.mesh.n_faces, dtype=np.int32)))
+    names = [getattr(link, "name", "") for link in getattr(body, "links", ())]
+    parts = []
+    for number in np.unique(face_link).tolist():
+        name = f"{number}_{names[number]}".replace(" ", "_") if number else ""
+        parts.append((name, np.flatnonzero(face_link == number)))
+    return parts
 
 
 def _labels(bodies: Sequence[Body]) -> list[str]:

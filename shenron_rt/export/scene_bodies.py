@@ -26,10 +26,10 @@ def drawable(bodies: Sequence[PlacedBody], limit: int = MAX_TRIANGLES) -> list[P
     limit : int
         Triangles of all together.
     """
-    sizes = np.array([b.body.mesh.n_faces for b in bodies], dtype=np.int64)
+    sizes = np.array([len(b.faces) for b in bodies], dtype=np.int64)
     order = np.argsort(sizes, kind="stable")
     kept = set(order[np.cumsum(sizes[order]) <= limit].tolist())
-    left = [f"{b.label} ({b.body.mesh.n_faces})" for k, b in enumerate(bodies) if k not in kept]
+    left = [f"{b.label} ({len(b.faces)})" for k, b in enumerate(bodies) if k not in kept]
     if left:
         _log.warning("more than %d triangles: the viewer gets no mesh of %s", limit, ", ".join(left))
     return [b for k, b in enumerate(bodies) if k in kept]

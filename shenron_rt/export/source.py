@@ -9,22 +9,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..config.profile import RadarProfile
 from ..config.scene import Scene, load_scene
 from ..constants import DEFAULT_MOUNT_XYZ
 from ..dsp import Detections, RadarCube
-from ..errors import ConfigError, InputError, did_you_mean
+from ..errors import ConfigError, InputError, NotFoundError, did_you_mean
 from ..frames import Pose
+from ..io.npz import load_npz
 from ..returns import Returns
 from ..runs import Run, load_run
 from ..scatterers import Scatterers
 from ..synthesis.adc import AdcCube
 
-__all__ = ["EPOCH_S", "ExportSource", "RunFrame", "RunRadar", "open_run", "stamp_ns"]
+__all__ = ["EPOCH_S", "MAPS", "ExportSource", "RunFrame", "RunRadar", "open_run", "stamp_ns"]
 
 #: Scene second 0 in files whose time stamps count from 1970 [s]: 2001-09-09 01:46:40 UTC. Not 0, which ROS reads as
 #: "the newest there is"; a round number, so that the scene's seconds can be read off a stamp.
 EPOCH_S = 1_000_000_000
+#: Maps of a frame: names of arrays of ``cube.npz`` and ``maps.npz``, and of the pictures drawn of them.
+MAPS = ("range_doppler", "range_azimuth")
 #: Between frames of runs that do not say when they were [s].
 _PERIOD_S = 0.1
 
@@ -58,16 +63,33 @@ class RunFrame:
     record: Mapping[str, Any] = field(repr=False)
 
     def detections(self) -> Detections:
-        """Read ``detections.csv``."""
+        """Read ``detections.csv``.
+
+        Raises
+        ------
+        NotFoundError
+            The run has not kept it.
+        """
+        if not self.has("detections.csv"):
+            raise NotFoundError(f"{self.folder}: the run kept no detections.csv, which every export needs")
         return Detections.from_csv(self.folder / "detections.csv")
 
     def adc(self) -> AdcCube | None:
         """Read ``adc.npz``; None where the run has none."""
         return AdcCube.load(self.folder / "adc.npz") if self.has("adc.npz") else None
 
-    def cube(self) -> RadarCube | None:
-        """Read ``cube.npz``; None where the run has none."""
-        return RadarCube.load(self.folder / "cube.npz") if self.has("cube.npz") else None
+    def cube(self, profile: RadarProfile) -> RadarCube | None:
+        """Read ``cube.npz``, or make a cube that knows nothing but the maps of ``maps.npz``; None without either."""
+        if self.has("cube.npz"):
+            return RadarCube.load(self.folder / "cube.npz")
+        if not self.has("maps.npz"):
+            return None
+        maps = load_npz(self.folder / "maps.npz", MAPS)
+        shape = (*maps["range_doppler"].shape, profile.n_virtual)
+        nothing = np.broadcast_to(np.complex128(0), shape)
+        cube = RadarCube(nothing, profile, profile.processing.range_window, profile.processing.doppler_window)
+        vars(cube).update({name: maps[name] for name in MAPS})  # in the place of what its properties would compute
+        return cube
 
     def returns(self) -> Returns | None:
         """Read ``returns.npz``; None where the run has none."""

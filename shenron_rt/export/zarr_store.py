@@ -78,7 +78,7 @@ def export_zarr(
 def _write_radar(group: Any, source: ExportSource, radar: RunRadar, step: Callable[[str], None] | None) -> None:
     """Make the arrays of one radar, then write them frame by frame."""
     first = radar.frames[0]
-    adc, cube = first.has("adc.npz"), first.cube()
+    adc, cube = first.has("adc.npz"), first.cube(radar.profile)
     names = source.names_of(first)
     for frame in radar.frames[1:]:
         names |= source.names_of(frame)
@@ -103,7 +103,7 @@ def _write_radar(group: Any, source: ExportSource, radar: RunRadar, step: Callab
     specs = frame_arrays(radar, sizes, adc=adc, cube=cube, truth=first.has("returns.npz")) | detection_arrays(sizes)
     arrays = {name: _create(group, spec, name) for name, spec in specs.items()}
     for row, frame in enumerate(radar.frames):
-        for name, values in _frame_values(frame, ids, sizes).items():
+        for name, values in _frame_values(radar, frame, ids, sizes).items():
             if name in arrays:
                 arrays[name][row] = values
         if step is not None:
@@ -119,10 +119,10 @@ def _create(group: Any, spec: ArraySpec, name: str) -> Any:
     return array
 
 
-def _frame_values(frame: RunFrame, ids: IntArray, sizes: Sizes) -> dict[str, NDArray[Any]]:
+def _frame_values(radar: RunRadar, frame: RunFrame, ids: IntArray, sizes: Sizes) -> dict[str, NDArray[Any]]:
     """Return everything of one frame by the name of its array."""
     values: dict[str, Any] = {}
-    adc, cube, returns = frame.adc(), frame.cube(), frame.returns()
+    adc, cube, returns = frame.adc(), frame.cube(radar.profile), frame.returns()
     if adc is not None:
         values["adc"] = adc.data.astype(np.complex64)
     if cube is not None:
