@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -144,7 +145,8 @@ def _rigid_parts(body: Body) -> list[tuple[str, IntArray]]:
     names = [getattr(link, "name", "") for link in getattr(body, "links", ())]
     parts = []
     for number in np.unique(face_link).tolist():
-        name = f"{number}_{names[number]}".replace(" ", "_") if number else ""
+        # names of parts may be patterns, "front left [tr]*": numbers keep them apart
+        name = re.sub(r"\W+", "_", f"{number} {names[number]}").strip("_") if number else ""
         parts.append((name, np.flatnonzero(face_link == number)))
     return parts
 
