@@ -223,6 +223,13 @@ def test_a_lidar_run_brings_its_own_points_and_default_mounts(tmp_path: Path) ->
     assert road.sum() > 100
     # a LiDAR 2.5 m above the road: its points lie on it in the ego frame, in CARLA's float32
     assert np.abs(points[road, 2]).max() < 1e-4
+    # CARLA's radar of tick 1, and of a tick that the LiDAR run has not: paired by number, not by order
+    for number, depth in ((1, 11.0), (7, 77.0)):
+        np.save(tmp_path / f"native_radar_{number:08d}.npy", np.array([[0, 0, 0, depth]], dtype=np.float32))
+    found = _export_mcap(tmp_path / "run", tmp_path / "b.mcap", "--recorded", str(tmp_path))
+    (entry,) = found["/recorded/native_radar/points"]
+    assert entry.time == times[1]
+    assert unpack(entry.message)["x"].tolist() == [11.0]
 
 
 def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:

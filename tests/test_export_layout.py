@@ -56,7 +56,7 @@ def test_panels_show_topics_and_fields_of_the_file(drive: Path, layout: dict[str
     assert images == {"/radar/front/range_doppler", "/radar/front/range_azimuth"} <= set(topics)
     paths = [p["value"] for p in panels["Plot!strongest"]["paths"]] + [panels["Table!front_objects"]["topicPath"]]
     for path in paths:
-        topic, field = re.fullmatch(r"(/[^.]+)\.(\w+)(?:\[:\])?", path).groups()
+        topic, field = re.fullmatch(r"(/[^.]+)\.(\w+)", path).groups()
         assert field in topics[topic][0].message
     assert panels["RosOut!budget"]["topicToRender"] in topics
 

@@ -41,7 +41,7 @@ def layout_json(source: ExportSource, topics: Sequence[str]) -> str:
     for radar in names:
         tables.append(f"Table!{radar}_objects")
         title = f"{radar}: objects, term by term"
-        panels[tables[-1]] = {"topicPath": f"/radar/{radar}/objects.objects[:]", "foxglovePanelTitle": title}
+        panels[tables[-1]] = {"topicPath": f"/radar/{radar}/objects.objects", "foxglovePanelTitle": title}
     top: Any = "3D!scene"
     if pictures:
         top = _split("row", top, _stack("column", pictures), 62)

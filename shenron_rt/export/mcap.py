@@ -130,8 +130,6 @@ def _write(
     if beside is not None:
         extra.append((beside.frame, beside.mount))
     mounts = mount_transforms(source, extra)
-    first_radar = source.radars[0].name
-    numbers = [f.index for f in source.radars[0].frames]
     for count, (radar, frame) in enumerate(source.in_order()):
         stamp = recorder.stamp(frame.mid_s)
         moving = [] if poses is None else poses.bodies(frame.mid_s, moving=True)
@@ -142,16 +140,29 @@ def _write(
             bodies = drawable([*poses.bodies(frame.mid_s, moving=False), *moving])
             recorder.log("/scene", "SceneUpdate", messages.scene_update(bodies, stamp), stamp)
         _write_radar(recorder, source, radar, frame, stamp)
-        if radar.name == first_radar:  # what stands beside the radars comes once a frame
-            for other in lidars:
-                if (points := other.points(frame)) is not None:
-                    message = messages.cloud(points, other.frame, stamp)
-                    recorder.log(f"/lidar/{other.name}/points", "PointCloud", message, stamp)
-            if beside is not None and (points := beside.points(numbers.index(frame.index))) is not None:
-                message = messages.cloud(points, beside.frame, stamp)
-                recorder.log(f"/recorded/{beside.name}/points", "PointCloud", message, stamp)
+        if radar is source.radars[0]:  # what stands beside the radars comes once a frame
+            _write_others(recorder, source, frame, lidars, beside, stamp)
         if step is not None:
             step(f"{radar.name} frame {frame.index}")
+
+
+def _write_others(
+    recorder: Recorder,
+    source: ExportSource,
+    frame: RunFrame,
+    lidars: Sequence[LidarClouds],
+    beside: RecordedClouds | None,
+    stamp: int,
+) -> None:
+    """Log the clouds that are not our radars'."""
+    found = [(f"/lidar/{other.name}/points", other.frame, other.points(frame)) for other in lidars]
+    if beside is not None:
+        position = [f.index for f in source.radars[0].frames].index(frame.index)
+        cloud = beside.points(position, source.numbers.get(frame.index))
+        found.append((f"/recorded/{beside.name}/points", beside.frame, cloud))
+    for topic, sensor, points in found:
+        if points is not None:
+            recorder.log(topic, "PointCloud", messages.cloud(points, sensor, stamp), stamp)
 
 
 def _write_radar(recorder: Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:

@@ -15,7 +15,7 @@ from ..frames import Pose
 from ..io.recorded import PointCloud, TiLog, read_carla_radar, read_ti_tlv
 from .points import Points, lidar_points, recorded_points, scatterer_points
 from .poses import EGO
-from .source import ExportSource, RunFrame
+from .source import ExportSource, RunFrame, trailing_number
 
 __all__ = ["LidarClouds", "RecordedClouds", "lidar_clouds", "recorded_clouds"]
 
@@ -90,7 +90,7 @@ def lidar_clouds(source: ExportSource, wanted: bool | None, backend: str = "auto
 
 @dataclass(frozen=True)
 class RecordedClouds:
-    """A recorded radar: cloud k stands beside the run's k-th frame.
+    """A recorded radar: a cloud for each frame of the run.
 
     Parameters
     ----------
@@ -98,19 +98,32 @@ class RecordedClouds:
     mount : Pose
         In the ego frame.
     clouds : sequence of PointCloud
+    numbers : tuple of int or None
+        What the file of each ends in.
     """
 
     name: str
     mount: Pose
     clouds: Sequence[PointCloud] | TiLog = field(repr=False)
+    numbers: tuple[int | None, ...] = ()
 
     @property
     def frame(self) -> str:
         """Name of its frame."""
         return f"recorded/{self.name}"
 
-    def points(self, position: int) -> Points | None:
-        """Return the points beside the run's frame at that position; None beyond the recording's end."""
+    def points(self, position: int, number: int | None = None) -> Points | None:
+        """Return the points beside a frame of the run; None where the recording has none.
+
+        Parameters
+        ----------
+        position : int
+            Of the frame among the run's frames.
+        number : int, optional
+            CARLA's number of the frame: where the recording has numbers too, nothing is paired but what has the same.
+        """
+        if number is not None and any(n is not None for n in self.numbers):
+            return recorded_points(self.clouds[self.numbers.index(number)]) if number in self.numbers else None
         return recorded_points(self.clouds[position]) if position < len(self.clouds) else None
 
 
@@ -135,7 +148,8 @@ def recorded_clouds(
             raise NotFoundError(f"--recorded {file}: no such file")
     name = re.sub(r"[_\-.]?\d*$", "", given[0].stem) or "radar"
     if given[0].suffix == ".npy":
-        return RecordedClouds(name, mount, [read_carla_radar(f) for f in given])
+        numbers = tuple(trailing_number(f.stem) for f in given)
+        return RecordedClouds(name, mount, [read_carla_radar(f) for f in given], numbers)
     if len(given) > 1:
         raise InputError(
             f"--recorded {given[1]}: several files are those of CARLA's radar (.npy); of a TI log give one"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +24,7 @@ from ..runs import Run, load_run
 from ..scatterers import Scatterers
 from ..synthesis.adc import AdcCube
 
-__all__ = ["EPOCH_S", "MAPS", "ExportSource", "RunFrame", "RunRadar", "open_run", "stamp_ns"]
+__all__ = ["EPOCH_S", "MAPS", "ExportSource", "RunFrame", "RunRadar", "open_run", "stamp_ns", "trailing_number"]
 
 #: Scene second 0 in files whose time stamps count from 1970 [s]: 2001-09-09 01:46:40 UTC. Not 0, which ROS reads as
 #: "the newest there is"; a round number, so that the scene's seconds can be read off a stamp.
@@ -129,6 +130,9 @@ class ExportSource:
     scene : Scene or None
     version : str
         Of the package that made the run.
+    numbers : mapping of int to int
+        Of a ``lidar`` run: the number that the file of each frame ends in, CARLA's frame number where the recorder
+        wrote it.
     """
 
     root: Path
@@ -137,6 +141,7 @@ class ExportSource:
     radars: tuple[RunRadar, ...]
     scene: Scene | None
     version: str
+    numbers: Mapping[int, int] = field(default_factory=dict)
 
     @property
     def n_frames(self) -> int:
@@ -194,7 +199,23 @@ def open_run(
     if len(listed) != len(wanted) or not all(r.frames for r in listed):
         _refuse(loaded, known, records, frames, setup)
     title = scene.name if scene is not None else loaded.root.name
-    return ExportSource(loaded.root, title, kind, listed, scene, str(loaded.summary.get("version", "")))
+    version = str(loaded.summary.get("version", ""))
+    return ExportSource(loaded.root, title, kind, listed, scene, version, _numbers(loaded, kind))
+
+
+def _numbers(run: Run, kind: str) -> dict[int, int]:
+    """Return the numbers of the files that a LiDAR run was made of, by frame."""
+    if kind != "lidar":
+        return {}
+    numbers = [trailing_number(Path(str(file)).stem) for file in run.summary.get("source", ())]
+    frames = [int(f["frame"]) for f in run.summary["radars"][0]["frames"]]
+    return {k: n for k, n in zip(frames, numbers, strict=False) if n is not None}
+
+
+def trailing_number(name: str) -> int | None:
+    """Return the digits that a name ends in, as a number."""
+    found = re.search(r"\d+$", name)
+    return None if found is None else int(found[0])
 
 
 def _refuse(
