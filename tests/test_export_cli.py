@@ -206,7 +206,9 @@ def test_a_log_of_tis_demo_stands_beside_ours(run: Path, tmp_path: Path) -> None
         np.testing.assert_array_equal(columns["snr_db"], [20, 15])
 
 
-def test_a_lidar_run_brings_its_own_points_and_default_mounts(tmp_path: Path) -> None:
+def test_a_lidar_run_brings_its_own_points_and_default_mounts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["cast-lidar", "braking", "-o", str(tmp_path / "cast"), "--layout", "ply", "--frames", "0:2"]) == 0
     files = [str(tmp_path / f"cast/frame_{k:06d}.ply") for k in range(2)]
     words = ["lidar", *files, "--tag-table", "0.9.14", "--frame", "carla", "--side-file", str(tmp_path / "cast")]
@@ -230,6 +232,9 @@ def test_a_lidar_run_brings_its_own_points_and_default_mounts(tmp_path: Path) ->
     (entry,) = found["/recorded/native_radar/points"]
     assert entry.time == times[1]
     assert unpack(entry.message)["x"].tolist() == [11.0]
+    (tmp_path / "native_radar_00000001.npy").unlink()
+    assert main(["export", str(tmp_path / "run"), "--to", "mcap", "--recorded", str(tmp_path)]) == 2
+    assert "frames 7 to 7 of the recording are none of the run's, 0 to 1" in capsys.readouterr().err
 
 
 def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:

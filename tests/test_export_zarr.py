@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -185,3 +186,15 @@ def test_a_run_of_adc_data_has_no_truth(street_run: Path, tmp_path: Path) -> Non
         # such runs do not say when their frames were: a tenth of a second apart
         np.testing.assert_allclose(data["time_s"], [mid, 0.1 + mid], rtol=1e-12)
         np.testing.assert_array_equal(data["adc"][0], data["adc"][1])
+
+
+def test_python_of_the_export_page_runs(
+    street_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = (Path(__file__).resolve().parents[1] / "docs/export.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^```python\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/braking-awrl1432").symlink_to(street_run)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "export.md", "exec"), {})
+    assert capsys.readouterr().out.rstrip().endswith("('frame', 'range', 'velocity')")

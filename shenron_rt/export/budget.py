@@ -120,7 +120,7 @@ def _budget(
         "gain_db": antenna.gain_tx_dbi + antenna.gain_rx_dbi,
         "pattern_db": 20 * math.log10(seen),
         "spreading_db": 10 * math.log10(profile.wavelength_m**2 / FOUR_PI_CUBED) - 40 * math.log10(max(distance, 1e-9)),
-        "loss_db": -antenna.radome_loss_db - 10 * math.log10(weather),
+        "loss_db": 0.0 - antenna.radome_loss_db - 10 * math.log10(weather),  # 0 - 0, not -0
     }
     received = 10 * math.log10(power) + 30
     return ObjectBudget(

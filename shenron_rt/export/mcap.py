@@ -107,7 +107,7 @@ def export_mcap(
     require("export to mcap", "foxglove", "mcap", "foxglove-sdk")
     source, target = open_run(run, radars=radars, frames=frames), Path(path)
     lidars = lidar_clouds(source, lidar, backend)
-    beside = recorded_clouds(recorded, recorded_mount or Pose(DEFAULT_MOUNT_XYZ))
+    beside = recorded_clouds(source, recorded, recorded_mount or Pose(DEFAULT_MOUNT_XYZ))
     with ExitStack() as stack:
         staged = stack.enter_context(whole_file(target, overwrite=overwrite))
         staged_layout = stack.enter_context(whole_file(layout_path(target), overwrite=overwrite))

@@ -128,13 +128,22 @@ class RecordedClouds:
 
 
 def recorded_clouds(
-    files: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None, mount: Pose
+    source: ExportSource, files: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None, mount: Pose
 ) -> RecordedClouds | None:
-    """Read a recording: one log of TI's demo, or CARLA's radar, one file or folder of files a frame.
+    """Read a recording: one log of TI's demo, or CARLA's radar, one file a frame or a folder of them.
+
+    Parameters
+    ----------
+    source : ExportSource
+        The run that it stands beside.
+    files : path or sequence of paths, optional
+    mount : Pose
+        Of the recorded radar in the ego frame.
 
     Raises
     ------
     NotFoundError, InputError
+        No such file, another layout, or ticks of which the run has none.
     """
     if files is None:
         return None
@@ -149,6 +158,12 @@ def recorded_clouds(
     name = re.sub(r"[_\-.]?\d*$", "", given[0].stem) or "radar"
     if given[0].suffix == ".npy":
         numbers = tuple(trailing_number(f.stem) for f in given)
+        ours, theirs = set(source.numbers.values()), {n for n in numbers if n is not None}
+        if ours and theirs and not ours & theirs:
+            raise InputError(
+                f"--recorded {given[0]}: frames {min(theirs)} to {max(theirs)} of the recording are none of the run's, "
+                f"{min(ours)} to {max(ours)}; names end in CARLA's frame number"
+            )
         return RecordedClouds(name, mount, [read_carla_radar(f) for f in given], numbers)
     if len(given) > 1:
         raise InputError(
