@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import resource
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -132,6 +133,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
         (["--to", "csv", "--frames", "7:9"], "no frames of 7:9; it has 0:3"),
         (["--to", "csv", "--lidar"], "--lidar: --to csv has no such option; it is for mcap and ros2"),
         (["--to", "zarr", "--text"], "--text: --to zarr has no such option; it is for pcd and ply"),
+        (["--to", "ply", "--no-pictures"], "--no-pictures: --to ply has no such option; it is for mcap"),
         (["--to", "mcap", "--recorded", "nothing.dat"], "nothing.dat: no such file"),
         (["--to", "mcap", "--recorded-mount", "1,0,1"], "--recorded-mount: give the recording too"),
         (["--to", "usd"], "usd"),
@@ -188,6 +190,43 @@ def test_carlas_radar_stands_beside_ours_frame_by_frame(run: Path, tmp_path: Pat
     mount = np.linalg.inv(in_world(tree, "ego")) @ in_world(tree, "recorded/radar")
     np.testing.assert_allclose(mount[:3, 3], [1, 0.5, 0.8], atol=1e-12)
     assert np.degrees(np.arctan2(mount[1, 0], mount[0, 0])) == pytest.approx(10)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_frames_without_a_detection_are_exported_too(form: str, street_run: Path, tmp_path: Path) -> None:
+    _needs(form)
+    empty = tmp_path / "run"
+    shutil.copytree(street_run, empty)
+    for file in empty.rglob("detections.csv"):
+        file.write_text(file.read_text().splitlines()[0] + "\n")
+    summary = json.loads((empty / "summary.json").read_text())
+    for record in summary["radars"][0]["frames"]:
+        record |= {"detections": 0, "strongest": None}
+    (empty / "summary.json").write_text(json.dumps(summary))
+    words = ["export", str(empty), "--to", form, "--frames", "0:2"]
+    assert main([*words, *(["--no-pictures"] if form == "mcap" else [])]) == 0
+    place = tmp_path / FORMATS[form][2]
+    if form == "mcap":
+        found = read_mcap(place)
+        assert [len(unpack(m.message)["x"]) for m in found["/radar/front/points"]] == [0, 0]
+        assert not {"/radar/front/strongest", "/radar/front/range_doppler"} & set(found)
+        assert "0 detections" in found["/link_budget"][0].message.message
+    elif form == "zarr":
+        from shenron_rt.export import open_dataset
+
+        with open_dataset(place) as data:
+            assert data.sizes["detection"] == 0
+            assert data["n_detections"].values.tolist() == [0, 0]
+    elif form == "ros2":
+        from rosbags.highlevel import AnyReader
+
+        with AnyReader([place]) as reader:
+            clouds = [
+                reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages() if c.topic.endswith("points")
+            ]
+        assert [cloud.width for cloud in clouds] == [0, 0]
+    else:
+        assert [f["points"] for f in json.loads((place / "export.json").read_text())["frames"]] == [0, 0]
 
 
 def test_a_log_of_tis_demo_stands_beside_ours(run: Path, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ _ENDINGS = {"mcap": ".mcap", "ros2": "-ros2", "pcd": "-pcd", "ply": "-ply", "csv
 #: Options that only some formats have.
 _ONLY = {
     "lidar": ("mcap", "ros2"), "epoch": ("mcap", "ros2"), "backend": ("mcap", "ros2"), "recorded": ("mcap",),
-    "recorded-mount": ("mcap",), "text": ("pcd", "ply"),
+    "recorded-mount": ("mcap",), "no-pictures": ("mcap",), "text": ("pcd", "ply"),
 }  # fmt: skip
 
 
@@ -39,6 +39,7 @@ def export(
     recorded: Annotated[list[Path] | None, Parameter(negative=())] = None,
     recorded_mount: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     epoch: int | None = None,
+    pictures: bool = True,
     text: Annotated[bool, Parameter(negative=())] = False,
     backend: Literal["auto", "cuda", "llvm", "scalar"] | None = None,
     json_: Json = False,
@@ -63,6 +64,8 @@ def export(
         mcap: its pose in the ego frame, x,y,z[,yaw,pitch,roll]. Default: 2,0,1.
     epoch
         mcap, ros2: seconds since 1970 that scene second 0 is stamped with. Default: 1000000000.
+    pictures
+        mcap: maps as pictures; drawing those that the run did not draw takes most of the time.
     text
         pcd, ply: text rather than binary records.
     backend
@@ -72,7 +75,7 @@ def export(
 
     given: dict[str, Any] = {
         "lidar": lidar, "epoch": epoch, "backend": backend, "recorded": recorded, "recorded-mount": recorded_mount,
-        "text": text or None,
+        "no-pictures": None if pictures else True, "text": text or None,
     }  # fmt: skip
     options = _options(to, {name: value for name, value in given.items() if value is not None})
     numbers = None if frames is None else frame_range(frames)
@@ -107,6 +110,8 @@ def _options(to: str, given: dict[str, Any]) -> dict[str, Any]:
             raise InputError("--recorded-mount: give the recording too, --recorded FILE")
     if "text" in given:
         values["binary"] = False
+    if values.pop("no-pictures", False):
+        values["pictures"] = False
     return values
 
 

@@ -66,6 +66,7 @@ def export_mcap(
     lidar: bool | None = None,
     recorded: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None = None,
     recorded_mount: Pose | None = None,
+    pictures: bool = True,
     backend: str = "auto",
     step: Callable[[str], None] | None = None,
 ) -> Path:
@@ -90,6 +91,8 @@ def export_mcap(
         A recorded radar beside ours: a log of TI's demo, or CARLA's radar, one file or a folder of one a frame.
     recorded_mount : Pose, optional
         Where it was mounted in the ego frame. Default: (2, 0, 1) m.
+    pictures : bool
+        Maps as pictures; those that the run did not draw take most of the time.
     backend : str
         What casts LiDAR rays.
     step : callable, optional
@@ -112,7 +115,7 @@ def export_mcap(
         staged = stack.enter_context(whole_file(target, overwrite=overwrite))
         staged_layout = stack.enter_context(whole_file(layout_path(target), overwrite=overwrite))
         with staged.open("xb") as file, Recorder(file, epoch_s) as recorder:
-            _write(recorder, source, lidars, beside, step)
+            _write(recorder, source, lidars, beside, pictures, step)
             recorder.describe(source)
         staged_layout.write_text(layout_json(source, recorder.topics), encoding="utf-8")
     return target
@@ -123,6 +126,7 @@ def _write(
     source: ExportSource,
     lidars: Sequence[LidarClouds],
     beside: RecordedClouds | None,
+    pictures: bool,
     step: Callable[[str], None] | None,
 ) -> None:
     poses = None if source.scene is None else ScenePoses(source.scene)
@@ -139,7 +143,9 @@ def _write(
         if count == 0 and poses is not None:  # geometry once: bodies that move do so by the transform of their frame
             bodies = drawable([*poses.bodies(frame.mid_s, moving=False), *moving])
             recorder.log("/scene", "SceneUpdate", messages.scene_update(bodies, stamp), stamp)
-        _write_radar(recorder, source, radar, frame, stamp)
+        if pictures:
+            _write_maps(recorder, source, radar, frame, stamp)
+        _write_radar(recorder, radar, frame, stamp)
         if radar is source.radars[0]:  # what stands beside the radars comes once a frame
             _write_others(recorder, source, frame, lidars, beside, stamp)
         if step is not None:
@@ -165,13 +171,18 @@ def _write_others(
             recorder.log(topic, "PointCloud", messages.cloud(points, sensor, stamp), stamp)
 
 
-def _write_radar(recorder: Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
-    """Log what one radar made of one frame."""
+def _write_maps(recorder: Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
+    """Log the maps of one frame as pictures."""
+    for name, png in map_pictures(source, radar, frame).items():
+        message = messages.image(png, radar_frame(radar.name), stamp)
+        recorder.log(f"/radar/{radar.name}/{name}", "CompressedImage", message, stamp)
+
+
+def _write_radar(recorder: Recorder, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
+    """Log what one radar detected in one frame, and why."""
     topic, sensor = f"/radar/{radar.name}", radar_frame(radar.name)
     points = detection_points(frame.detections())
     recorder.log(f"{topic}/points", "PointCloud", messages.cloud(points, sensor, stamp), stamp)
-    for name, png in map_pictures(source, radar, frame).items():
-        recorder.log(f"{topic}/{name}", "CompressedImage", messages.image(png, sensor, stamp), stamp)
     budgets = object_budgets(radar, frame, frame.returns())
     text = budget_text(radar, frame, budgets)
     recorder.log("/link_budget", "Log", messages.log_text(text, radar.name, stamp), stamp)
