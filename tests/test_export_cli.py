@@ -276,6 +276,24 @@ def test_a_lidar_run_brings_its_own_points_and_default_mounts(
     assert "frames 7 to 7 of the recording are none of the run's, 0 to 1" in capsys.readouterr().err
 
 
+def test_a_run_of_adc_data_has_clouds_and_maps_and_no_scene(
+    street_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    adc = street_run / "radars/front/frame_000000/adc.npz"
+    assert main(["process", str(adc), "-o", str(tmp_path / "run"), "--no-pictures"]) == 0
+    found = _export_mcap(tmp_path / "run", tmp_path / "a.mcap")
+    radar = "/radar/awrl1432"
+    assert {topic for topic in found if topic.startswith(radar)} == {
+        f"{radar}/{name}" for name in ("points", "range_doppler", "range_azimuth", "objects", "strongest")
+    }
+    assert "/scene" not in found
+    tree = matrices(found["/tf"][0].message)
+    assert set(tree) == {"ego", "radar/awrl1432"}
+    np.testing.assert_allclose(in_world(tree, "radar/awrl1432")[:3, 3], [2, 0, 1])
+    assert main(["export", str(tmp_path / "run"), "--to", "mcap", "-o", str(tmp_path / "b.mcap"), "--lidar"]) == 2
+    assert "there is no scene to cast a LiDAR over" in capsys.readouterr().err
+
+
 def test_two_radars_share_transforms_and_meshes(tmp_path: Path) -> None:
     run = run_scene(tmp_path / "run", "clear_road", "--profile", "awrl1432", "--profile", "awrl1432_137mhz", rays=2_000)
     found = _export_mcap(run, tmp_path / "a.mcap", "--lidar")

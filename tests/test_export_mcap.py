@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from export_tools import EPOCH_NS, distance_to_mesh, in_world, matrices, moved, read_mcap, run_scene, unpack
+from export_tools import EPOCH_NS, STREET, distance_to_mesh, in_world, matrices, moved, read_mcap, run_scene, unpack
 
 import shenron_rt as srt
 from shenron_rt.cli import main
+from shenron_rt.config.scene import Actor
 
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed (extra mcap)")
 pytest.importorskip("mcap_protobuf", reason="mcap-protobuf-support is not installed (extra test)")
@@ -199,6 +200,24 @@ def test_a_turning_ego_keeps_points_on_turning_and_static_bodies(tmp_path: Path)
             to_body = np.linalg.inv(pose) @ in_world(tree, "radar/left")
             # without the turn during the 0.1 s between frames a point at 20 m would be off by a metre
             assert distance_to_mesh(entity, moved(to_body, own[:: len(own) // 20])).max() < 1e-6
+
+
+@pytest.mark.skipif("articulation" not in Actor.model_fields, reason="bodies of this version are rigid as a whole")
+def test_wheels_turn_in_frames_of_their_own(tmp_path: Path) -> None:
+    scene = STREET.replace("shape: car,", "shape: car, articulation: auto,")
+    (tmp_path / "street.yaml").write_text(scene)
+    run = run_scene(tmp_path / "run", str(tmp_path / "street.yaml"), "--frames", "1:2")
+    assert main(["export", str(run), "--to", "mcap", "--no-pictures"]) == 0
+    found = read_mcap(tmp_path / "run.mcap")
+    tree = matrices(found["/tf"][0].message)
+    parts = [e for e in found["/scene"][0].message.entities if e.id.split("/")[0] == "lead"]
+    assert len(parts) == 5  # the body and four wheels
+    hits = srt.Scatterers.load(run / "radars/front/frame_000001/scatterers.npz")
+    own = hits.position[hits.object_id == CAR]
+    own = own[:: max(1, len(own) // 100)]
+    to_world = in_world(tree, "radar/front")
+    nearest = [distance_to_mesh(e, moved(np.linalg.inv(in_world(tree, e.frame_id)) @ to_world, own)) for e in parts]
+    assert np.min(nearest, axis=0).max() < 1e-6
 
 
 def test_the_same_run_gives_the_same_bytes(street_run: Path, tmp_path: Path) -> None:
