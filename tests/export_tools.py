@@ -73,6 +73,12 @@ def read_mcap(path: Path) -> dict[str, list[Any]]:
     return dict(found)
 
 
+def export_mcap_and_read(run: Path, target: Path, *options: str) -> dict[str, list[Any]]:
+    """Export a run by the command and return its messages by topic."""
+    assert main(["export", str(run), "--to", "mcap", "-o", str(target), *options]) == 0
+    return read_mcap(target)
+
+
 def unpack(message: Any) -> dict[str, np.ndarray]:
     """Return the columns of a foxglove.PointCloud by its own description of its fields."""
     kinds = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<f4", 8: "<f8"}

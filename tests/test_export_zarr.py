@@ -164,6 +164,9 @@ def test_several_radars_are_groups_and_one_must_be_named(tmp_path: Path) -> None
         assert data["adc"].shape == (1, p.waveform.chirps, p.n_virtual, p.waveform.samples)
     with pytest.raises(NotFoundError, match="not a Zarr store"):
         open_dataset(run)
+    zarr.open_group(tmp_path / "other.zarr", mode="w")
+    with pytest.raises(InputError, match="its root names no radars"):
+        open_dataset(tmp_path / "other.zarr")
 
 
 def test_a_run_of_adc_data_has_no_truth(street_run: Path, tmp_path: Path) -> None:

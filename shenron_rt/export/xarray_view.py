@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, NotFoundError, did_you_mean
 from .target import require
@@ -38,18 +39,19 @@ def open_dataset(path: str | os.PathLike[str], radar: str | None = None) -> xarr
     NotFoundError
         No store.
     InputError
-        No such radar, several and none named, or xarray and zarr are not installed.
+        No such radar, several and none named, a store of something else, or xarray and zarr are not installed.
     """
     require("open_dataset", "xarray", "data", "xarray")
     require("open_dataset", "zarr", "data", "zarr")
     import xarray
-    import zarr
 
     store = Path(path)
     if not (store / "zarr.json").is_file():
         raise NotFoundError(f"{store}: not a Zarr store, it has no zarr.json")
-    attributes: Any = zarr.open_group(store, mode="r").attrs.asdict()
+    attributes = json.loads((store / "zarr.json").read_text(encoding="utf-8")).get("attributes", {})
     known = [str(name) for name in attributes.get("radars", ())]
+    if not known:
+        raise InputError(f"{store}: a Zarr store, but none that export --to zarr wrote; its root names no radars")
     if radar is None and len(known) != 1:
         raise InputError(f"{store}: the store has {len(known)} radars, say which: radar= one of {known}")
     if radar is not None and radar not in known:
