@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import shenron_rt as srt
 from shenron_rt.cli import main
 
 #: Two vehicles at 15 and 10 m/s between walls: where everything is at any time is known in closed form.
@@ -37,6 +38,12 @@ def run_scene(folder: Path, scene: str, *options: str, rays: int = 20_000) -> Pa
     words = ["run", scene, "-o", str(folder), "--rays", str(rays), "--no-pictures", "--json", *options]
     assert main(words) == 0
     return folder
+
+
+def columns_of(file: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a run's ``detections.csv``, with the flag of ghosts."""
+    found = srt.Detections.from_csv(file)
+    return {name: found.table[name] for name in found.table.dtype.names or ()} | {"ghost": found.ghost}
 
 
 class Json:

@@ -219,6 +219,32 @@ def test_frames_without_a_detection_are_exported_too(form: str, street_run: Path
         assert [f["points"] for f in json.loads((place / "export.json").read_text())["frames"]] == [0, 0]
 
 
+def test_ghosts_are_marked_in_clouds_and_stores(street_run: Path, tmp_path: Path) -> None:
+    for form in ("mcap", "zarr"):
+        _needs(form)
+    from shenron_rt.export import open_dataset
+
+    run = tmp_path / "run"
+    shutil.copytree(street_run, run)
+    folder = run / "radars/front/frame_000000"
+    rows = len(srt.Detections.from_csv(folder / "detections.csv"))
+    chains = ["chain,ghost", "40>101,1", *["101,0"] * (rows - 1)]
+    (folder / "detections.chains.csv").write_text("\n".join(chains) + "\n")
+    summary = json.loads((run / "summary.json").read_text())
+    summary["radars"][0]["frames"][0]["strongest"] |= {"chain": "40>101", "ghost": True}
+    (run / "summary.json").write_text(json.dumps(summary))
+    wanted = [1] + [0] * (rows - 1)
+    found = export_mcap_and_read(run, tmp_path / "a.mcap", "--frames", "0:1", "--no-pictures")
+    assert unpack(found["/radar/front/points"][0].message)["ghost"].tolist() == wanted
+    assert found["/radar/front/strongest"][0].message["chain"] == "40>101"
+    assert "a ghost by way of 40>101" in found["/link_budget"][0].message.message
+    assert main(["export", str(run), "--to", "zarr"]) == 0
+    with open_dataset(tmp_path / "run.zarr") as data:
+        assert data["detection_ghost"].sel(frame=0).values.astype(int).tolist()[:rows] == wanted
+    assert main(["export", str(run), "--to", "csv"]) == 0
+    assert srt.Detections.from_csv(tmp_path / "run-csv/front/frame_000000.csv").ghost.tolist() == wanted
+
+
 def test_a_run_that_kept_maps_and_detections_only_gives_the_same_pictures_and_maps(
     street_run: Path, tmp_path: Path
 ) -> None:

@@ -9,7 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from export_tools import EPOCH_NS, STREET, distance_to_mesh, in_world, matrices, moved, read_mcap, run_scene, unpack
+from export_tools import (
+    EPOCH_NS,
+    STREET,
+    columns_of,
+    distance_to_mesh,
+    in_world,
+    matrices,
+    moved,
+    read_mcap,
+    run_scene,
+    unpack,
+)
 
 import shenron_rt as srt
 from shenron_rt.cli import main
@@ -65,8 +76,8 @@ def test_time_stamps_are_scene_seconds_of_mid_frame_after_the_fixed_epoch(read: 
 def test_radar_clouds_hold_the_detections_of_the_run(street_run: Path, read: Messages) -> None:
     for folder, entry in zip(_frames(street_run), read["/radar/front/points"], strict=True):
         assert entry.message.frame_id == "radar/front"
-        columns, table = unpack(entry.message), srt.Detections.from_csv(folder / "detections.csv").table
-        assert list(columns) == ["x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "object_id", "tag"]
+        columns, table = unpack(entry.message), columns_of(folder / "detections.csv")
+        assert list(columns) == ["x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "object_id", "tag", "ghost"]
         for name, column in columns.items():
             # coordinates and levels are float32 in the file
             np.testing.assert_array_equal(column, table[name].astype(column.dtype), err_msg=name)
@@ -162,7 +173,9 @@ def test_link_budget_adds_up_and_is_that_of_the_run(street_run: Path, read: Mess
 def test_strongest_is_that_of_the_summary(street_run: Path, read: Messages) -> None:
     summary = json.loads((street_run / "summary.json").read_text())["radars"][0]["frames"]
     for record, entry in zip(summary, read["/radar/front/strongest"], strict=True):
-        assert entry.message == {"frame": record["frame"], **record["strongest"]}
+        number = record["strongest"]["object_id"]
+        known = {"frame": record["frame"], "chain": str(number), "ghost": False}
+        assert entry.message == known | record["strongest"]
 
 
 TURN = """

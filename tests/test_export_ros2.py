@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from export_tools import EPOCH_NS
+from export_tools import EPOCH_NS, columns_of
 
 import shenron_rt as srt
 from shenron_rt.cli import main
@@ -70,12 +70,12 @@ def test_topics_types_and_counts(read: dict[str, list[Any]], bag: Path) -> None:
 
 def test_clouds_and_scans_hold_the_detections_of_the_run(street_run: Path, read: dict[str, list[Any]]) -> None:
     for k, (time, _, cloud) in enumerate(read["/radar/front/points"]):
-        table = srt.Detections.from_csv(street_run / f"radars/front/frame_{k:06d}/detections.csv").table
+        table = columns_of(street_run / f"radars/front/frame_{k:06d}/detections.csv")
         assert cloud.header.frame_id == "radar/front"
-        assert (cloud.height, cloud.width, cloud.row_step) == (1, len(table), cloud.point_step * len(table))
+        assert (cloud.height, cloud.width, cloud.row_step) == (1, len(table["x"]), cloud.point_step * len(table["x"]))
         assert cloud.header.stamp.sec * 10**9 + cloud.header.stamp.nanosec == time
         points = _table(cloud)
-        assert points.dtype.names == ("x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "object_id", "tag")
+        assert points.dtype.names == ("x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "object_id", "tag", "ghost")
         for name in points.dtype.names:
             np.testing.assert_array_equal(points[name], table[name].astype(points[name].dtype), err_msg=name)
         scan = read["/radar/front/scan"][k][2]

@@ -137,6 +137,23 @@ def test_labels_fall_into_the_cells_of_the_closed_form() -> None:
     np.testing.assert_allclose(means["azimuth_rad"], [np.arctan2(4, 20), np.arctan2(-3, 30), np.nan])
 
 
+def test_ghosts_count_for_the_power_of_an_object_and_not_for_its_place() -> None:
+    from dataclasses import replace
+
+    from shenron_rt.chains import Chains
+
+    returns = hand_made_frame().returns
+    # the static echo at 12 m is the car's, by way of the post
+    ids = returns.object_id.copy()
+    ids[3] = 8
+    direct = replace(returns, object_id=ids)
+    chains = Chains(np.array([[7, -1], [8, -1], [0, -1], [7, 8]]), np.arange(4, dtype=np.int32), np.arange(4) == 3)
+    without, with_ghost = (object_means(r, np.array([8])) for r in (direct, replace(direct, chains=chains)))
+    assert with_ghost["power_w"] == without["power_w"]
+    np.testing.assert_allclose(with_ghost["range_m"], np.hypot(30, 3))
+    assert without["range_m"] < 30
+
+
 def test_folded_velocities_are_labelled_where_the_map_shows_them() -> None:
     from dataclasses import replace
 

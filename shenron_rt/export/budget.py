@@ -30,7 +30,7 @@ class ObjectBudget:
     id : int
     name, tag : str
     range_m, azimuth_deg, elevation_deg, velocity_mps : float
-        Means over its echoes, weighted by their power; velocity positive = receding.
+        Means over its echoes but for ghosts, weighted by their power; velocity positive = receding.
     tx_power_dbm : float
     gain_db : float
         Both antennas on boresight.
@@ -95,16 +95,16 @@ def object_budgets(radar: RunRadar, frame: RunFrame, returns: Returns | None) ->
     """
     if returns is None or len(returns) == 0 or not returns.calibrated:
         return []
-    power = returns.power_by_object()
+    power, placed = returns.power_by_object(), set(returns.object_id[~returns.ghost].tolist())
     records = {int(o["id"]): o for o in frame.record.get("objects", ())}
-    ordered = sorted((i for i, p in power.items() if i != 0 and p > 0), key=lambda i: -power[i])
+    ordered = sorted((i for i, p in power.items() if i in placed - {0} and p > 0), key=lambda i: -power[i])
     return [_budget(radar.profile, returns, i, power[i], records.get(i, {})) for i in ordered]
 
 
 def _budget(
     profile: RadarProfile, returns: Returns, number: int, power: float, record: Mapping[str, Any]
 ) -> ObjectBudget:
-    rows = returns.object_id == number
+    rows = (returns.object_id == number) & ~returns.ghost
     weight = np.abs(returns.amplitude[rows]) ** 2
     position = weight @ returns.position[rows] / weight.sum()
     each, _, _ = spherical(returns.position[rows])
@@ -149,7 +149,12 @@ def budget_text(radar: RunRadar, frame: RunFrame, budgets: list[ObjectBudget]) -
             f", strongest at {top['range_m']:.2f} m, {top['azimuth_deg']:+.1f} deg, {top['velocity_mps']:+.2f} m/s, "
             f"SNR {top['snr_db']:.1f} dB, object {top['object_id']}"
         )
+        if top.get("ghost"):
+            head += f", a ghost by way of {top.get('chain')}"
+    told = {b.id for b in budgets} | {0}
     missing = [
-        f"{o['name']} ({o['id']}): no echo" for o in frame.record.get("objects", ()) if o.get("power_dbw") is None
+        f"{o['name']} ({o['id']}): {'no echo' if o.get('power_dbw') is None else 'no echo from where it is'}"
+        for o in frame.record.get("objects", ())
+        if o["id"] not in told
     ]
     return "\n".join([head, *(b.line() for b in budgets), *missing])

@@ -45,7 +45,7 @@ def export_clouds(
         The folder to make.
     form : ``"pcd"``, ``"ply"`` or ``"csv"``
         CSV is the run's ``detections.csv``, all columns; the others have x, y, z, velocity, snr_db, rcs_dbsm,
-        object_id, tag.
+        object_id, tag, ghost.
     radars, frames : optional
         Which of the run's. Default: all.
     overwrite : bool
@@ -86,6 +86,8 @@ def _write(file: Path, frame: RunFrame, form: CloudFormat, binary: bool, sensor:
     found = frame.detections()
     if form == "csv":
         shutil.copyfile(frame.folder / "detections.csv", file)
+        if frame.has("detections.chains.csv"):
+            shutil.copyfile(frame.folder / "detections.chains.csv", file.with_name(f"{file.stem}.chains.csv"))
     elif form == "pcd":
         write_pcd(file, detection_points(found), binary=binary)
     else:

@@ -77,18 +77,19 @@ def object_means(returns: Returns, ids: IntArray) -> dict[str, FloatArray]:
     -------
     dict of str to (n,) float
         ``range_m azimuth_rad elevation_rad velocity_mps``, of the power-weighted mean position, and ``power_w``.
+        Ghosts, which show an object where it is not, count for its power alone.
     """
     names = ("range_m", "azimuth_rad", "elevation_rad", "velocity_mps", "power_w")
     out = {name: np.full(len(ids), np.nan) for name in names}
-    power, total = np.abs(returns.amplitude) ** 2, returns.power_by_object()
+    power, total = np.where(returns.ghost, 0.0, np.abs(returns.amplitude) ** 2), returns.power_by_object()
     _, rate, _ = _polar(returns)
     for k, number in enumerate(ids.tolist()):  # a scene has a few dozen
         rows = returns.object_id == number
+        out["power_w"][k] = total.get(number, np.nan)
         weight = power[rows]
         if weight.sum() <= 0:
             continue
         place = spherical(weight @ returns.position[rows] / weight.sum())
-        values = [*place, weight @ rate[rows] / weight.sum(), total[number]]
-        for name, value in zip(names, values, strict=True):
+        for name, value in zip(names, [*place, weight @ rate[rows] / weight.sum()], strict=False):
             out[name][k] = value
     return out

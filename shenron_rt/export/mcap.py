@@ -31,7 +31,7 @@ _STRONGEST: dict[str, Any] = {
     "type": "object",
     "properties": {
         "frame": {"type": "integer"}, "range_m": _NUMBER, "azimuth_deg": _NUMBER, "velocity_mps": _NUMBER,
-        "snr_db": _NUMBER, "object_id": {"type": "integer"},
+        "snr_db": _NUMBER, "object_id": {"type": "integer"}, "chain": {"type": "string"}, "ghost": {"type": "boolean"},
     },
 }  # fmt: skip
 _OBJECTS: dict[str, Any] = {
@@ -188,5 +188,8 @@ def _write_radar(recorder: Recorder, radar: RunRadar, frame: RunFrame, stamp: in
     recorder.log("/link_budget", "Log", messages.log_text(text, radar.name, stamp), stamp)
     objects = {"frame": frame.index, "objects": [b.to_dict() for b in budgets]}
     recorder.log_json(f"{topic}/objects", _OBJECTS, objects, stamp)
-    if frame.record.get("strongest") is not None:
-        recorder.log_json(f"{topic}/strongest", _STRONGEST, {"frame": frame.index, **frame.record["strongest"]}, stamp)
+    top = frame.record.get("strongest")
+    if top is not None:
+        named = {"frame": frame.index, "chain": "" if top["object_id"] < 0 else str(top["object_id"]), "ghost": False}
+        known = {name: value for name, value in top.items() if name in _STRONGEST["properties"]}
+        recorder.log_json(f"{topic}/strongest", _STRONGEST, named | known, stamp)

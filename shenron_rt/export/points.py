@@ -21,9 +21,18 @@ __all__ = [
 Points = NDArray[np.void]
 
 _XYZ = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
-#: Sensor frame [m], range rate positive = receding [m/s], dB, dBsm; object -1 is noise or a side lobe.
+#: Sensor frame [m], range rate positive = receding [m/s], dB, dBsm; object -1 is noise or a side lobe; ghost 1 shows
+#: its object where it is not.
 DETECTION_POINT = np.dtype(
-    [*_XYZ, ("velocity", "<f4"), ("snr_db", "<f4"), ("rcs_dbsm", "<f4"), ("object_id", "<i4"), ("tag", "u1")]
+    [
+        *_XYZ,
+        ("velocity", "<f4"),
+        ("snr_db", "<f4"),
+        ("rcs_dbsm", "<f4"),
+        ("object_id", "<i4"),
+        ("tag", "u1"),
+        ("ghost", "u1"),
+    ]
 )
 LIDAR_POINT = np.dtype([*_XYZ, ("cos_incidence", "<f4"), ("object_id", "<i4"), ("tag", "u1")])
 #: What a recorded radar gives; NaN where it gives no SNR.
@@ -41,7 +50,7 @@ def detection_points(detections: Detections) -> Points:
     points = np.zeros(len(detections), dtype=DETECTION_POINT)
     for name in ("x", "y", "z", "velocity", "snr_db", "rcs_dbsm", "tag"):
         points[name] = detections.table[name]
-    points["object_id"] = _ids(detections.object_id)
+    points["object_id"], points["ghost"] = _ids(detections.object_id), detections.ghost
     return points
 
 

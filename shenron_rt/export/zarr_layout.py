@@ -131,4 +131,6 @@ def detection_arrays(sizes: Sizes) -> dict[str, ArraySpec]:
         specs[f"detection_{name}"] = ArraySpec(
             ("frame", "detection"), (sizes.frames, sizes.detections), kind.name, fill, _about(unit, text)
         )
+    about = _about("1", "shows its object where it is not")
+    specs["detection_ghost"] = ArraySpec(("frame", "detection"), (sizes.frames, sizes.detections), "bool", 0, about)
     return specs

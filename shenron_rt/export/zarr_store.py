@@ -154,8 +154,8 @@ def _truth(
 def _detections(found: Detections, width: int) -> dict[str, NDArray[Any]]:
     """Return the columns of the detections, padded to the longest frame's."""
     values: dict[str, NDArray[Any]] = {"n_detections": np.asarray(len(found), dtype=np.int32)}
-    for name in found.table.dtype.names or ():
-        column = found.table[name]
+    columns = {name: found.table[name] for name in found.table.dtype.names or ()} | {"ghost": found.ghost}
+    for name, column in columns.items():
         kind = column.dtype.kind
         fill = np.nan if kind == "f" else NOTHING if kind == "i" else 0
         padded = np.full(width, fill, dtype=column.dtype)
