@@ -34,7 +34,8 @@ HALF_LENGTH_M = 2.25
 HEAD = """\
 # What the scenes show, in numbers
 
-(Made by `python examples/evidence_table.py`; the tests `test_contracts_*.py` hold the contracts behind it.)
+(Made by `python examples/evidence_table.py`; the tests `test_contracts_*.py` hold the contracts behind it.
+`shenron-rt explain RUN` prints the strongest peak of every frame of any run, and whose it is.)
 
 Strongest cell of the range-azimuth map beyond 2 m. Each frame has its own seed and moves the first car by up to 2 m
 along and across and 5 degrees of yaw. A wall cell is speckle of a few looks, so not every frame without the azimuth

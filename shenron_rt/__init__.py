@@ -10,6 +10,8 @@ import importlib.metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .attribution import Explanation as Explanation
+    from .attribution import explain as explain
     from .comparison import Comparison as Comparison
     from .comparison import compare as compare
     from .config.materials import Material as Material
@@ -54,6 +56,7 @@ _HOME = {
     "Comparison": "comparison",
     "ConfigError": "errors",
     "Detections": "dsp",
+    "Explanation": "attribution",
     "Frame": "pipeline",
     "InputError": "errors",
     "LidarFrame": "lidar.frame",
@@ -73,6 +76,7 @@ _HOME = {
     "cast_lidar": "tracing.lidar",
     "compare": "comparison",
     "detect": "dsp",
+    "explain": "attribution",
     "illuminate": "returns",
     "load_materials": "config.materials",
     "load_profile": "config.profile",

@@ -16,5 +16,7 @@ RCS_FLOOR_DBSM = -120.0
 DEFAULT_MOUNT_XYZ = (2.0, 0.0, 1.0)
 #: Two-way antenna level relative to the peak down to which rays are launched [dB].
 PATTERN_FLOOR_TWO_WAY_DB = -40.0
+#: Most surfaces along a path through a scene: two over a road, three of a corner reflector.
+MOST_SCENE_BOUNCES = 5
 #: (4 pi)^3 of the radar equation.
 FOUR_PI_CUBED = (4.0 * math.pi) ** 3

@@ -15,7 +15,7 @@ from .errors import InputError
 __all__ = ["Paths"]
 
 #: Parameters that are not one array with a row a path and a column a hit.
-_PER_PATH = {"count": (), "radiates": (), "two_way": (), "area": (3,), "slope": (2,), "curvature": (3,)}
+_PER_PATH = {"count": (), "radiates": (), "two_way": (), "area": (3,), "slope": (2,), "curvature": (3,), "rcs": ()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,8 @@ class Paths:
         Derivatives of the whole way there and back over u and v [m].
     curvature : (n, 3) float
         Second derivatives: uu, vv, uv [m].
+    rcs : (n,) float
+        Where a point target radiates, not a footprint: its RCS [m^2]. NaN elsewhere.
     """
 
     count: IntArray
@@ -58,6 +60,7 @@ class Paths:
     area: FloatArray
     slope: FloatArray
     curvature: FloatArray
+    rcs: FloatArray
 
     def __post_init__(self) -> None:
         n, b = self.object_id.shape
@@ -204,6 +207,6 @@ def _empty(most: int) -> dict[str, NDArray[Any]]:
         "count": ((), np.uint8), "point": ((most, 3), np.float64), "normal": ((most, 3), np.float64),
         "velocity": ((most, 3), np.float64), "material": ((most,), np.uint16), "object_id": ((most,), np.uint32),
         "tag": ((most,), np.uint8), "radiates": ((), np.uint8), "two_way": ((), np.bool_), "area": ((3,), np.float64),
-        "slope": ((2,), np.float64), "curvature": ((3,), np.float64),
+        "slope": ((2,), np.float64), "curvature": ((3,), np.float64), "rcs": ((), np.float64),
     }  # fmt: skip
     return {name: np.zeros((0, *shape), dtype=dtype) for name, (shape, dtype) in shapes.items()}

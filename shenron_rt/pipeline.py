@@ -20,11 +20,15 @@ from .retrace import segments
 from .returns import Returns, illuminate
 from .scatterers import Scatterers
 from .synthesis import AdcCube, synthesize
+from .synthesis.heard import heard_radars
 from .synthesis.synthesize import synthesize_segments
 from .tracing import trace
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .echo.shenron import ShenronModel
+    from .synthesis.interference import HeardRadar
 
 __all__ = ["Frame", "from_scatterers", "simulate", "simulate_all"]
 
@@ -37,6 +41,7 @@ class _Synthesis(TypedDict):
     frame: int
     accuracy: float
     radar: str
+    interference: Sequence[HeardRadar]
 
 
 @dataclass(frozen=True)
@@ -88,12 +93,13 @@ def simulate(
     seed: int | None = None,
     frame: int = 0,
     rays: int = 300_000,
-    max_bounces: int = 1,
+    max_bounces: int | None = None,
     model: str | ShenronModel = "physical",
     noise: str | None = "thermal",
     mount: Pose | None = None,
     backend: str = "auto",
     accuracy: float = 1e-5,
+    previous: Frame | None = None,
     retrace: int = 1,
 ) -> Frame:
     """Render one frame of one radar.
@@ -123,6 +129,8 @@ def simulate(
         Replaces the radar's pose in the ego frame. With a LiDAR frame: default (2, 0, 1) m; needs its ``sensor_pose``.
     accuracy : float
         Of the ADC synthesis, relative to the RMS of the noise-free cube.
+    previous : Frame, optional
+        An earlier frame of the same radar, from which ``processing.ambiguity: two_frame`` unfolds velocities.
     retrace : int
         Segments of the frame at whose middles the scene is traced again, up to the number of loops; 1 is mid-frame
         only, from where everything moves in straight lines. A LiDAR frame has one instant only.
@@ -152,7 +160,7 @@ def simulate(
             source = source.with_normals()
         scatterers = lidar_scatterers(source, profile, mount, radar=name, seed=seed or 0, index=frame)
         return from_scatterers(
-            scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy
+            scatterers, profile, "automotive", time=time, model=model, noise=noise, accuracy=accuracy, previous=previous
         )
     if not isinstance(source, Scene):
         raise InputError(f"simulate: a Scene is needed, got {type(source).__name__}; a LidarFrame is taken too")
@@ -164,15 +172,19 @@ def simulate(
     look = functools.partial(
         trace, source, radar=place.name, seed=seed, frame=frame, rays=rays, max_bounces=max_bounces, backend=backend
     )
-    finish = functools.partial(from_scatterers, model=model, noise=noise, accuracy=accuracy, time=time)
+    finish = functools.partial(
+        from_scatterers, model=model, noise=noise, accuracy=accuracy, time=time, previous=previous
+    )
+    scatterers = look(used, time=time)
+    heard = heard_radars(source, place, used, time=time, seed=scatterers.seed, frame=frame)
     if retrace == 1:
-        return finish(look(used, time=time), used, source.materials)
+        return finish(scatterers, used, source.materials, interference=heard)
     light = functools.partial(illuminate, model=model, materials=source.materials)
 
     def several(returns: Returns) -> Iterator[tuple[RadarProfile, Returns]]:
         return segments(used, returns, retrace, lambda part, start: look(part, time=time + start), light)
 
-    return finish(look(used, time=time), used, source.materials, segments_of=several)
+    return finish(scatterers, used, source.materials, interference=heard, segments_of=several)
 
 
 def from_scatterers(
@@ -184,6 +196,8 @@ def from_scatterers(
     model: str | ShenronModel,
     noise: str | None,
     accuracy: float,
+    previous: Frame | None = None,
+    interference: Sequence[HeardRadar] = (),
     segments_of: Callable[[Returns], Iterable[tuple[RadarProfile, Returns]]] | None = None,
 ) -> Frame:
     """Return the frame that scatterers give: the chain from there on is the same behind both doors.
@@ -197,8 +211,10 @@ def from_scatterers(
         Material table of the scene.
     time : float
         Scene seconds at the first chirp's start [s].
-    model, noise, accuracy
+    model, noise, accuracy, previous
         As for :func:`simulate`.
+    interference : sequence of HeardRadar
+        Other radars that this one hears.
     segments_of : callable, optional
         Gives the echoes of parts of the frame from those of mid-frame; see :mod:`shenron_rt.retrace`.
     """
@@ -209,14 +225,21 @@ def from_scatterers(
             "echo model %s gives the counts of the released code, not watts: levels in dBm, SNR and RCS mean nothing",
             returns.model,
         )
-    options = _Synthesis(noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar)
+    options = _Synthesis(noise=noise, seed=seed, frame=frame, accuracy=accuracy, radar=radar, interference=interference)
     if segments_of is None:
         adc = synthesize(returns, used, **options)
     else:
         adc = synthesize_segments(segments_of(returns), used, returns, **options)
     settings = used.processing
     cube = process(adc, range_window=settings.range_window, doppler_window=settings.doppler_window)
-    detections = detect(cube, pfa=settings.pfa, blanking_m=settings.blanking_m)
+    detections = detect(
+        cube,
+        pfa=settings.pfa,
+        blanking_m=settings.blanking_m,
+        ambiguity=settings.ambiguity,
+        previous=None if previous is None else previous.detections,
+        interval_s=None if previous is None else time - previous.time,
+    )
     return Frame(
         scatterers=scatterers,
         returns=returns,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -11,7 +10,9 @@ from typing import TYPE_CHECKING
 from .config.profile import RadarProfile
 from .config.scene import Scene
 from .pipeline import Frame, from_scatterers, simulate
+from .scatterers import Scatterers
 from .scene.motion_of import check_times
+from .synthesis.heard import heard_radars
 from .tracing import trace
 
 if TYPE_CHECKING:
@@ -51,7 +52,8 @@ def simulate_sequence(
     Yields
     ------
     Frame
-        In the order of ``frames``; the same bytes as single calls of :func:`shenron_rt.simulate` give.
+        In the order of ``frames``; the same bytes as calls of :func:`shenron_rt.simulate` give, each with the frame
+        before it as ``previous``.
 
     Raises
     ------
@@ -63,8 +65,9 @@ def simulate_sequence(
     numbers = list(frames)
     check_times(scene, (k * scene.frame_period_s + used.frame_mid_s for k in numbers))
     if retrace != 1:  # its rays are cast while its echoes are summed
+        last: Frame | None = None
         for k in numbers:
-            yield simulate(
+            last = simulate(
                 scene,
                 used,
                 radar=mount.name,
@@ -78,9 +81,28 @@ def simulate_sequence(
                 backend=backend,
                 accuracy=accuracy,
                 retrace=retrace,
+                previous=last,
             )
+            yield last
         return
-    finish = functools.partial(from_scatterers, model=model, noise=noise, accuracy=accuracy)
+    done: list[Frame] = []  # the last one, for what two frames tell together
+
+    def finish(scatterers: Scatterers, time: float) -> Frame:
+        heard = heard_radars(scene, mount, used, time=time, seed=scatterers.seed, frame=scatterers.frame)
+        frame = from_scatterers(
+            scatterers,
+            used,
+            scene.materials,
+            time=time,
+            model=model,
+            noise=noise,
+            accuracy=accuracy,
+            previous=done[-1] if done else None,
+            interference=heard,
+        )
+        done[:] = [frame]
+        return frame
+
     waiting: deque[Future[Frame]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="shenron-rt-frame") as worker:
         try:
@@ -97,8 +119,7 @@ def simulate_sequence(
                     max_bounces=max_bounces,
                     backend=backend,
                 )
-                work = functools.partial(finish, scatterers, used, scene.materials, time=time)
-                waiting.append(worker.submit(work))
+                waiting.append(worker.submit(finish, scatterers, time))
                 if len(waiting) == _AHEAD:
                     yield waiting.popleft().result()
             while waiting:

@@ -42,3 +42,13 @@ def shared_data() -> Path:
 def rng() -> np.random.Generator:
     """Generator with a fixed seed."""
     return np.random.default_rng(20_250_101)
+
+
+@pytest.fixture(scope="session")
+def street_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run folder of three frames of a street with a car ahead, few rays, no pictures."""
+    from export_tools import STREET, run_scene
+
+    folder = tmp_path_factory.mktemp("street")
+    (folder / "street.yaml").write_text(STREET, encoding="utf-8")
+    return run_scene(folder / "run", str(folder / "street.yaml"), "--frames", "0:3")

@@ -31,8 +31,9 @@ LAYERS = (
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable", "sequence"),
     ("runs", "run_frames"),
+    ("attribution", "objects"),  # read run folders
     ("plot", "report"),
-    ("comparison",),  # a comparison saves its figure page
+    ("comparison", "export"),  # a comparison saves its figure page, an export draws maps that the run did not
     ("cli",),
 )
 #: library -> packages that may import it at all
@@ -43,10 +44,26 @@ ONLY_IN = {
     "trimesh": {"scene", "tracing"},
     "matplotlib": {"plot", "report"},
     "cyclopts": {"cli"},
+    "foxglove": {"export"},
+    "rosbags": {"export"},
+    "xarray": {"export"},
+    "zarr": {"export"},
     "rich": {"cli"},
 }
+#: libraries of extras, which need not be there
+OPTIONAL = {"foxglove", "rosbags", "xarray", "zarr"}
 #: libraries that cost start-up time: inside functions only
-LAZY = {"mitsuba", "drjit", "trimesh", "matplotlib", "finufft", "scipy.signal", "scipy.spatial", "scipy.optimize"}
+LAZY = {
+    "mitsuba",
+    "drjit",
+    "trimesh",
+    "matplotlib",
+    "finufft",
+    "scipy.signal",
+    "scipy.spatial",
+    "scipy.optimize",
+    *OPTIONAL,
+}
 
 
 class Import(NamedTuple):
@@ -103,7 +120,7 @@ def test_imports_follow_the_data_flow(imports: list[Import]) -> None:
 
 
 def test_nothing_but_the_command_line_imports_plots_reports_or_the_command_line(imports: list[Import]) -> None:
-    top = ("plot", "report", "comparison", "cli")
+    top = ("plot", "report", "comparison", "export", "cli")
     outside = [i for i in imports if i.importer.split(".")[0] not in top]
     assert [i.where for i in outside if i.target[1:].split(".")[0] in top and i.target.startswith(".")] == []
 

@@ -161,7 +161,10 @@ def test_frame_ranges_are_half_open() -> None:
 def test_profiles_lists_all_and_shows_one_with_sources(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["profiles"]) == 0
     out = capsys.readouterr().out
-    for name in ("awrl1432", "awrl1432_137mhz", "awrl1432boost", "radarbook", "radarbook2", "ti_cascade", "mmwcas"):
+    for name in (
+        "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "radarbook", "radarbook2",
+        "radarbook_200mhz", "ti_cascade", "mmwcas",
+    ):  # fmt: skip
         assert f" {name} " in out
     assert "R max [m]" in out
     assert main(["profiles", "awrl1432boost"]) == 0

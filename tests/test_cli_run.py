@@ -237,3 +237,27 @@ def test_process_refuses_a_capture_of_another_radar(capsys: pytest.CaptureFixtur
     Path("adc.mat").write_bytes(b"x")
     assert main(["process", "adc.mat"]) == 2
     assert "(DCA1000 capture)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("method", ["staggered", "two_frame"])
+def test_processing_ambiguity_unfolds_in_run_and_process(method: str) -> None:
+    profile = {"staggered": "awrl1432_staggered", "two_frame": "awrl1432"}[method]
+    Path("fast.yaml").write_text(
+        "version: 1\nego: {velocity_mps: [27.7, 0, 0]}\n"
+        "point_targets: [{id: 9, xyz_m: [60, 0, 1], rcs_dbsm: 20}]\nradars: [{name: front, profile: awrl1432}]\n"
+    )
+    options = ["--set", f"processing.ambiguity={method}", "--frames", "0:2", "--json"]
+    assert main(["run", "fast.yaml", *FAST, "--profile", profile, "-o", "fast", *options]) == 0
+    strongest = [f["strongest"] for f in json.loads(Path("fast/summary.json").read_text())["radars"][0]["frames"]]
+    assert strongest[1]["velocity_mps"] == pytest.approx(-27.7, abs=0.05)
+    assert strongest[1]["range_m"] == pytest.approx(58.0 - 2.77 - 27.7 * load_profile(profile).frame_mid_s, abs=0.01)
+    # what was recorded, processed again
+    frames = [np.load(f"fast/radars/front/frame_00000{k}/adc.npz")["data"] for k in range(2)]
+    np.save("frames.npy", np.stack(frames))
+    again = ["process", "frames.npy", "--profile", profile, "-o", "again", "--no-pictures", *options]
+    if method == "two_frame":
+        assert main([*again]) == 2
+        again += ["--frame-period-s", "0.1"]
+    assert main(again) == 0
+    summary = json.loads(Path("again/summary.json").read_text())
+    assert summary["radars"][0]["frames"][1]["strongest"]["velocity_mps"] == pytest.approx(-27.7, abs=0.05)

@@ -37,6 +37,42 @@ def test_building_folds_for_every_seed(seed: int) -> None:
     test_building_at_the_end_of_the_road_folds_to_plus_25_7(seed)
 
 
+def _unfolded(seed: int, method: str) -> srt.Frame:
+    """Return the last frame of the perturbed scene, velocities unfolded by one of the two methods."""
+    scene = perturbed(srt.load_scene("highway"), seed)
+    name = {"staggered": "awrl1432_staggered", "two_frame": "awrl1432"}[method]
+    profile = srt.load_profile(name, {"processing.ambiguity": method})
+    if method == "staggered":
+        return srt.simulate(scene, profile, seed=seed, **FAST)
+    first = srt.simulate(scene, profile, seed=seed, **FAST)
+    return srt.simulate(scene, profile, seed=seed, time=0.1, frame=1, previous=first, **FAST)
+
+
+@pytest.mark.parametrize("method", ["staggered", "two_frame"])
+@pytest.mark.parametrize("seed", range(3))
+def test_building_at_the_end_of_the_road_unfolds_to_minus_27_7(seed: int, method: str) -> None:
+    frame = _unfolded(seed, method)
+    table = frame.detections.table
+    ahead = table[(table["object_id"] == 50) & (np.abs(table["azimuth"]) < np.radians(10))]
+    # as raw: the face spans 4.6 degrees, cos takes 0.09 m/s at most
+    assert ahead["velocity"][0] == pytest.approx(-27.7, abs=0.2)
+    assert not ahead["ambiguous"][0]
+    # the face stands 80 m away at time 0; its range holds at mid-frame without the half bin of the fold's coupling
+    away = 80.0 - 27.7 * (frame.time + frame.profile.frame_mid_s)
+    assert ahead["range"][0] == pytest.approx(away, abs=0.1)
+    for key, speed in ((101, 22.0 - 27.7), (102, 33.0 - 27.7)):
+        row = table[table["object_id"] == key][0]
+        assert row["velocity"] == pytest.approx(speed, abs=frame.cube.velocity_step_mps)
+        assert not row["ambiguous"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["staggered", "two_frame"])
+@pytest.mark.parametrize("seed", range(3, 20))
+def test_building_unfolds_for_every_seed(seed: int, method: str) -> None:
+    test_building_at_the_end_of_the_road_unfolds_to_minus_27_7(seed, method)
+
+
 def test_cars_on_the_highway_are_slow_enough_not_to_fold() -> None:
     frame = srt.simulate(srt.load_scene("highway"), seed=1, **FAST)
     for key, speed in ((101, 22.0 - 27.7), (102, 33.0 - 27.7)):

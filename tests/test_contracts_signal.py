@@ -16,7 +16,10 @@ from shenron_rt.errors import InputError
 from shenron_rt.physics import near_range_plate_rcs
 from shenron_rt.scatterers import Scatterers
 
-PROFILES = ["awrl1432", "awrl1432_137mhz", "awrl1432boost", "mmwcas", "radarbook", "radarbook2", "ti_cascade"]
+PROFILES = [
+    "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "mmwcas", "radarbook",
+    "radarbook2", "radarbook_200mhz", "ti_cascade",
+]  # fmt: skip
 
 
 def plate_scene(side_m: float, range_m: float, **more: object) -> srt.Scene:

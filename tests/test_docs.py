@@ -186,6 +186,18 @@ def test_python_of_the_guide_runs(number: int) -> None:
     exec(compile(_blocks(ROOT / "docs/guide.md", "python")[number], f"guide.md-{number}", "exec"), {})
 
 
+def test_python_of_the_explain_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (example,) = _blocks(ROOT / "docs/explain.md", "python")
+    exec(compile(example, "explain.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("detected ")
+
+
+def test_python_of_the_tracking_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (example,) = _blocks(ROOT / "docs/tracking.md", "python")
+    exec(compile(example, "tracking.md", "exec"), {})
+    assert capsys.readouterr().out == "(1,) 0\n"
+
+
 def test_python_of_the_turntable_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = _blocks(ROOT / "docs/rcs.md", "python")

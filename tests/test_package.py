@@ -48,7 +48,7 @@ def test_wheel_holds_all_code_and_data_and_nothing_else(wheel: Path) -> None:
         if p.is_file()
     }
     held = {n for n in _names(wheel) if ".dist-info/" not in n}
-    assert len(data) >= 13  # seven profiles, five scenes, a material table
+    assert len(data) >= 15  # eight profiles, six scenes, a material table
     assert held == code | data | {"shenron_rt/py.typed"}
 
 

@@ -16,7 +16,8 @@ from shenron_rt.errors import ConfigError, NotFoundError
 from shenron_rt.resources import package_folder
 
 NAMES = (
-    "awrl1432", "awrl1432_137mhz", "awrl1432boost", "mmwcas", "radarbook", "radarbook2", "ti_cascade",
+    "awrl1432", "awrl1432_137mhz", "awrl1432_staggered", "awrl1432boost", "ddm_4x4", "mmwcas", "radarbook",
+    "radarbook2", "radarbook_200mhz", "ti_cascade",
 )  # fmt: skip
 
 

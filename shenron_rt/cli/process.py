@@ -77,6 +77,9 @@ def process(
         ),
     ] = None,
     swap_iq: Annotated[bool, Parameter(negative=(), help="The .bin capture has Q before I.")] = False,
+    frame_period_s: Annotated[
+        float | None, Parameter(help="Interval of the frames [s]; for processing.ambiguity=two_frame.")
+    ] = None,
     pictures: Annotated[bool, Parameter(help="Draw the pictures of every frame.")] = True,
     json_: Json = False,
 ) -> int:
@@ -106,9 +109,9 @@ def process(
         runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place,
         progress(len(wanted), "processing", quiet=json_) as step,
     ):
-        records = []
+        records, last = [], None
         for index in wanted:
-            frame = _frame(cubes[index], index)
+            frame = last = _frame(cubes[index], index, frame_period_s, last)
             folder = runs.frame_folder(place.partial, used.name, index)
             runs.write_frame(folder, frame)
             if pictures:
@@ -137,14 +140,21 @@ def _summary(adc: Path, used: RadarProfile, records: list[dict[str, Any]]) -> di
     return {"version": _version(), "source": str(adc), "backend": None, "seed": None, "radars": [radar]}
 
 
-def _frame(cube: AdcCube, index: int) -> ProcessedFrame:
+def _frame(cube: AdcCube, index: int, period_s: float | None, last: ProcessedFrame | None) -> ProcessedFrame:
     from ..dsp import detect
     from ..dsp import process as transform
 
     settings = cube.profile.processing
     spectrum = transform(cube, range_window=settings.range_window, doppler_window=settings.doppler_window)
-    found = detect(spectrum, pfa=settings.pfa, blanking_m=settings.blanking_m)
-    return ProcessedFrame(cube, spectrum, found, index, returns=cube.returns)
+    found = detect(
+        spectrum,
+        pfa=settings.pfa,
+        blanking_m=settings.blanking_m,
+        ambiguity=settings.ambiguity,
+        previous=None if last is None else last.detections,
+        interval_s=period_s,
+    )
+    return ProcessedFrame(cube, spectrum, found, index, time=index * (period_s or 0.0), returns=cube.returns)
 
 
 def _read(path: Path, name: str | None, overrides: Overrides, form: _Format) -> list[AdcCube]:

@@ -69,7 +69,7 @@ def run(
     rays
         Rays of each radar and frame. Default: 300000.
     max_bounces
-        Surfaces along a path, 1 to 5. Default: 1.
+        Surfaces along a path, 1 to 5. Default: the scene's, 1 unless it says otherwise.
     backend
         Ray tracing backend. Default: auto (cuda, then llvm, then scalar).
     accuracy
@@ -92,7 +92,8 @@ def run(
         "frames": frames, "rays": rays, "max_bounces": max_bounces, "backend": backend, "accuracy": accuracy,
         "model": model, "retrace": retrace,
     }  # fmt: skip
-    options, keep = _options(loaded.run, given), parts_of(write)
+    options = _options({"max_bounces": loaded.max_bounces, **loaded.run}, given)
+    keep = parts_of(write)
     loaded = _with_profiles(loaded, profile or [], overrides.profile)
     loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
     if not loaded.radars:
@@ -260,6 +261,12 @@ def _write_config(path: Path, scene: Scene) -> None:
         | {"profile": scene.profile_of(r).model_dump(mode="json", exclude_none=True)}
         for r in scene.radars
     ]
+    if scene.interferers:
+        data["interferers"] = [
+            i.model_dump(mode="json", exclude_none=True)
+            | {"profile": scene.profile_of(i).model_dump(mode="json", exclude_none=True)}
+            for i in scene.interferers
+        ]
     located = _locator(scene.folder)
     for part in (data.get("ego", {}), *data.get("static", ()), *data.get("actors", ())):
         for key in ("mesh", "resolve", "carla_tags", "trajectory_file"):

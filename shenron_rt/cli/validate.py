@@ -19,7 +19,17 @@ _LIDAR = (".laz", ".las")
 _TEXT = (".csv", ".txt")
 #: Fewest columns of a table of LiDAR points.
 _COLUMNS = 6
-_SCENE_KEYS = {"static", "actors", "point_targets", "radars", "ego", "lidars", "frame_period_s", "weather"}
+_SCENE_KEYS = {
+    "static",
+    "actors",
+    "point_targets",
+    "radars",
+    "ego",
+    "lidars",
+    "frame_period_s",
+    "weather",
+    "interferers",
+}
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Gate:
             cells * profile.range_resolution_m,
             cells * profile.velocity_resolution_mps,
             cells * step,
-            2 * profile.max_velocity_mps,
+            2 * profile.bursts[0].max_velocity_mps,
         )
 
 

@@ -15,91 +15,13 @@ from .._typing import FloatArray
 from ..constants import BOLTZMANN, SPEED_OF_LIGHT
 from ..physics.antenna import AntennaPattern, CosinePattern, GaussianPattern, IsotropicPattern, TabulatedPattern
 from ..resources import find
-from ._base import ConfigModel, Vector3
+from ._base import ConfigModel
 from .loader import apply_overrides, read_yaml, validate_model
+from .waveform import Array, Positive, Waveform
 
 __all__ = ["Antenna", "Array", "Processing", "RadarProfile", "Receiver", "Waveform", "load_profile"]
 
-Positive = Annotated[float, Field(gt=0)]
 WindowName = Literal["rect", "hann", "hamming", "blackmanharris", "taylor", "chebyshev"]
-
-
-class Waveform(ConfigModel):
-    """A frame of linear up-chirps.
-
-    ``bandwidth_hz`` is swept during the sampled window ``samples / sample_rate_hz``; ``chirps`` counts loops, that is
-    chirps per transmitter; ``chirp_period_s`` is the interval between the starts of consecutive chirps, one number or
-    a pattern that repeats.
-    """
-
-    carrier_hz: Annotated[float, Field(gt=1e9, lt=1e12)]
-    bandwidth_hz: Positive
-    samples: Annotated[int, Field(ge=2)]
-    sample_rate_hz: Positive
-    chirps: Annotated[int, Field(ge=1)]
-    chirp_period_s: Positive | tuple[Positive, ...]
-    adc_start_s: Annotated[float, Field(ge=0)] = 0.0
-    adc: Literal["complex", "real"] = "complex"
-
-    @model_validator(mode="after")
-    def _chirps_do_not_overlap(self) -> Self:
-        needed = self.adc_start_s + self.sampled_time_s
-        if not self.periods_s or min(self.periods_s) < needed * (1 - 1e-9):
-            raise ValueError(
-                f"chirp_period_s {self.chirp_period_s} is shorter than adc_start_s + samples / sample_rate_hz, "
-                f"{needed:.6g} s"
-            )
-        return self
-
-    @property
-    def periods_s(self) -> tuple[float, ...]:
-        """The repeating pattern of chirp intervals [s]."""
-        return self.chirp_period_s if isinstance(self.chirp_period_s, tuple) else (self.chirp_period_s,)
-
-    @property
-    def sampled_time_s(self) -> float:
-        """Length of the sampled window of a chirp [s]."""
-        return self.samples / self.sample_rate_hz
-
-    @property
-    def slope_hz_per_s(self) -> float:
-        """Chirp slope k [Hz/s]."""
-        return self.bandwidth_hz / self.sampled_time_s
-
-    @property
-    def center_hz(self) -> float:
-        """f_c = f0 + k t_mid, t_mid the middle of the sampled window [Hz]."""
-        return self.carrier_hz + self.slope_hz_per_s * (self.adc_start_s + self.sampled_time_s / 2)
-
-
-class Array(ConfigModel):
-    """Transmitters and receivers, in half wavelengths (``tx``, ``rx``, or ``line: n``) or metres (``tx_m``, ``rx_m``).
-
-    Axes are those of the radar frame (x out, y left, z up): azimuth column c stands at y = -c, elevation row r at
-    z = r. ``design_frequency_hz`` fixes the half wavelength of the board; without it the profile's f_c does.
-    """
-
-    multiplex: Literal["simultaneous", "tdm", "bpm"] = "simultaneous"
-    line: Annotated[int, Field(ge=1)] | None = None
-    tx: tuple[Vector3, ...] | None = None
-    rx: tuple[Vector3, ...] | None = None
-    tx_m: tuple[Vector3, ...] | None = None
-    rx_m: tuple[Vector3, ...] | None = None
-    design_frequency_hz: Positive | None = None
-
-    @model_validator(mode="after")
-    def _one_way_to_say_it(self) -> Self:
-        ways = [self.line is not None, self.tx is not None or self.rx is not None]
-        ways.append(self.tx_m is not None or self.rx_m is not None)
-        if sum(ways) != 1:
-            raise ValueError("give exactly one of: line, tx and rx (half wavelengths), tx_m and rx_m (metres)")
-        if ways[1] and not (self.tx and self.rx):
-            raise ValueError("tx and rx are needed together, each with at least one [x, y, z]")
-        if ways[2] and not (self.tx_m and self.rx_m):
-            raise ValueError("tx_m and rx_m are needed together, each with at least one [x, y, z]")
-        if self.line is not None and self.multiplex != "simultaneous":
-            raise ValueError(f"multiplex {self.multiplex} needs tx and rx positions; line has one transmitter")
-        return self
 
 
 class Antenna(ConfigModel):
@@ -128,13 +50,27 @@ class Antenna(ConfigModel):
 
 
 class Receiver(ConfigModel):
-    """Levels and the receiver chain."""
+    """Levels and the receiver chain.
+
+    ``phase_noise_dbc_hz`` lists [offset_hz, dbc_hz] of the oscillator that transmitter and mixer share.
+    """
 
     tx_power_dbm: float
     noise_figure_db: Annotated[float, Field(ge=0)]
     temperature_k: Positive = 290.0
     adc_bits: Annotated[int, Field(ge=2, le=24)] | None = None
     full_scale_dbm: float | None = None
+    phase_noise_dbc_hz: tuple[tuple[Positive, float], ...] | None = None
+
+    @model_validator(mode="after")
+    def _offsets_ascend(self) -> Self:
+        offsets = [offset for offset, _ in self.phase_noise_dbc_hz or ()]
+        if self.phase_noise_dbc_hz is not None and (not offsets or sorted(set(offsets)) != offsets):
+            raise ValueError(
+                "phase_noise_dbc_hz: a list of [offset_hz, dbc_hz] with ascending offsets is needed, "
+                f"got offsets {offsets}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _bits_need_a_scale(self) -> Self:
@@ -150,6 +86,7 @@ class Processing(ConfigModel):
     doppler_window: WindowName = "hann"
     pfa: Annotated[float, Field(gt=0, lt=1)] = 1e-3
     blanking_m: Annotated[float, Field(ge=0)] = 0.0
+    ambiguity: Literal["staggered", "two_frame", "tdm_phase"] | None = None
 
 
 class RadarProfile(ConfigModel):
@@ -163,6 +100,20 @@ class RadarProfile(ConfigModel):
     receiver: Receiver
     processing: Processing = Processing()
     sources: Mapping[str, str] = {}
+
+    @model_validator(mode="after")
+    def _sub_bands_hold_whole_bins(self) -> Self:
+        if self.array.multiplex != "ddm":
+            return self
+        w, loops = self.waveform, self.waveform.chirps // self.waveform.n_bursts
+        if loops % self.n_subbands:
+            raise ValueError(
+                f"multiplex ddm: {loops} chirps do not fill {self.n_subbands} sub-bands ({self.n_tx} transmitters and "
+                f"the empty ones) evenly; take a multiple of {self.n_subbands}"
+            )
+        if len(w.periods_s) > w.n_bursts:
+            raise ValueError("multiplex ddm: one chirp_period_s is needed, or one for each burst (stagger: burst)")
+        return self
 
     # ---- waveform
     @property
@@ -198,13 +149,21 @@ class RadarProfile(ConfigModel):
     @property
     def n_chirps_per_loop(self) -> int:
         """Chirps in one loop: n_tx under TDM and BPM, else 1."""
-        return 1 if self.array.multiplex == "simultaneous" else self.n_tx
+        return self.n_tx if self.array.multiplex in ("tdm", "bpm") else 1
+
+    @property
+    def n_subbands(self) -> int:
+        """Parts of the Doppler spectrum between which DDM shifts the transmitters, empty ones included; else 1."""
+        return self.n_tx + (self.array.empty_subbands or 1) if self.array.multiplex == "ddm" else 1
 
     @cached_property
     def raw_chirp_start_s(self) -> FloatArray:
         """(n_loops, n_chirps_per_loop) start of every transmitted chirp from the frame's start [s]."""
         count = self.waveform.chirps * self.n_chirps_per_loop
-        steps = np.resize(np.asarray(self.waveform.periods_s, dtype=np.float64), max(count - 1, 0))
+        periods = np.asarray(self.waveform.periods_s, dtype=np.float64)
+        if self.waveform.n_bursts > 1:
+            periods = np.repeat(periods, count // len(periods))
+        steps = np.resize(periods, max(count - 1, 0))
         starts = np.concatenate([[0.0], np.cumsum(steps)])
         return starts.reshape(self.waveform.chirps, self.n_chirps_per_loop)
 
@@ -222,6 +181,17 @@ class RadarProfile(ConfigModel):
     def velocity_resolution_mps(self) -> float:
         """Lambda / (2 N T_loop) [m/s]."""
         return self.wavelength_m / (2 * self.waveform.chirps * self.loop_period_s)
+
+    @cached_property
+    def bursts(self) -> tuple[Self, ...]:
+        """The radar as it works in each burst: the same with the loops and the one interval of that burst."""
+        w = self.waveform
+        if w.n_bursts == 1:
+            return (self,)
+        parts = [{"chirps": w.chirps // w.n_bursts, "chirp_period_s": t, "stagger": "chirp"} for t in w.periods_s]
+        # validated anew: a copy would keep the cached axes of the whole frame
+        data = self.model_dump()
+        return tuple(self.model_validate(data | {"waveform": data["waveform"] | part}) for part in parts)
 
     @property
     def frame_mid_s(self) -> float:
@@ -259,7 +229,7 @@ class RadarProfile(ConfigModel):
     @property
     def n_tx(self) -> int:
         """Transmitters."""
-        return len(self.tx_m)
+        return len(self.array.tx_m or self.array.tx or (0,))
 
     @property
     def n_rx(self) -> int:

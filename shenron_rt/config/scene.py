@@ -10,13 +10,14 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from ..constants import DEFAULT_MOUNT_XYZ
+from ..constants import DEFAULT_MOUNT_XYZ, MOST_SCENE_BOUNCES
 from ..errors import InputError, did_you_mean
 from ..resources import find, package_folder
 from ..scatterers import Weather
 from ..scene.mesh import TaggedMesh
 from ..tags import SemanticTag
 from ._base import ConfigModel, Placed, Vector3
+from .interferer import Interferer
 from .loader import apply_overrides, read_yaml, validate_model
 from .profile import RadarProfile, load_profile
 
@@ -232,6 +233,8 @@ class Scene(ConfigModel):
     description: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
     frame_period_s: Annotated[float, Field(gt=0)] = 0.1
+    #: Surfaces along a path, for scenes whose echoes need several; ``trace`` and the command line can say otherwise.
+    max_bounces: Annotated[int, Field(ge=1, le=MOST_SCENE_BOUNCES)] = 1
     materials: str | Path = "automotive"
     weather: WeatherModel | None = None
     ego: Ego = Ego()
@@ -240,6 +243,7 @@ class Scene(ConfigModel):
     point_targets: tuple[PointTarget, ...] = ()
     radars: tuple[RadarMount, ...] = (RadarMount(),)
     lidars: tuple[LidarMount, ...] = ()
+    interferers: tuple[Interferer, ...] = ()
     #: Options of the run that wrote this file (``config.yaml`` of a run folder); the command line takes them up again.
     run: Mapping[str, Any] = Field(default_factory=dict, repr=False)
     folder: Path = Field(default_factory=Path.cwd, exclude=True, repr=False)
@@ -281,8 +285,8 @@ class Scene(ConfigModel):
                 return radar
         raise InputError(f"no radar {name!r} in the scene; {did_you_mean(name, names)}")
 
-    def profile_of(self, radar: RadarMount) -> RadarProfile:
-        """Return the profile of a radar; a relative path is looked for beside the scene first."""
+    def profile_of(self, radar: RadarMount | Interferer) -> RadarProfile:
+        """Return the profile of a radar, simulated or not; a relative path is looked for beside the scene first."""
         if isinstance(radar.profile, RadarProfile):
             return radar.profile
         beside = self.folder / radar.profile

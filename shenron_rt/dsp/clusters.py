@@ -143,7 +143,7 @@ def _parts(cube: RadarCube, returns: Returns) -> tuple[IntArray, IntArray, Float
     radial = np.einsum("ni,ni->n", x, v) / distance
     doppler_hz = radial * (2 * p.center_hz / SPEED_OF_LIGHT)
     # the beat frequency of a moving echo is k tau + Doppler
-    apparent = distance + doppler_hz * (SPEED_OF_LIGHT / (2 * p.slope_hz_per_s))
+    apparent = distance + radial * cube.mid_offset_s + doppler_hz * (SPEED_OF_LIGHT / (2 * p.slope_hz_per_s))
     n_range, n_velocity, _ = cube.data.shape
     row = np.rint(apparent * (PARTS / cube.range_step_m)).astype(np.int32) % (PARTS * n_range)
     bins = doppler_hz * (PARTS * cube.n_fft[1] * p.loop_period_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..io.npz import load_npz, save_npz
 from ..scatterers import Weather
 from . import angle
-from .multiplex import LoopCode
+from .multiplex import LoopCode, strongest_alias
 from .spectra import doppler_spectrum, range_spectrum
 from .windows import window
 
@@ -52,6 +52,11 @@ class RadarCube:
         Whose attenuation the echoes had.
     returns : Returns or None
         The echoes behind it, for truth attribution; not saved.
+    mid_offset_s : float
+        Middle of the chirps behind it after mid-frame; 0 but for a burst of a frame [s].
+    bursts : tuple of RadarCube
+        Of a profile with ``stagger: burst``: the cube of each burst, with Doppler bins of its own chirp interval. Those
+        are detected on; the cube itself sums the whole frame, with half the level at the folds of either interval.
     """
 
     data: ComplexArray
@@ -62,6 +67,8 @@ class RadarCube:
     noise_added: bool = True
     weather: Weather | None = None
     returns: Returns | None = field(default=None, repr=False)
+    mid_offset_s: float = 0.0
+    bursts: tuple[RadarCube, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if not all(self.n_fft):
@@ -153,6 +160,8 @@ class RadarCube:
         )
         n_range, n_velocity, _ = self.data.shape
         snapshots = self.data[:, :, self.azimuth_channels]
+        if self.profile.n_subbands > 1:  # one target would show several times, in other directions
+            snapshots = snapshots * strongest_alias(self.range_doppler, self.profile.n_subbands)[:, :, None]
         rows = max(1, _BEAM_CELLS // (n_velocity * len(vectors)))
         parts = [bartlett_max(snapshots[i : i + rows], vectors) for i in range(0, n_range, rows)]
         return np.concatenate(parts)
@@ -163,6 +172,9 @@ class RadarCube:
         names = ["data", "range_m", "velocity_mps", "azimuth_rad", "range_doppler", "range_azimuth"]
         names += ["range_window", "doppler_window", "n_fft", "noise_added", "noise_power_w"]
         arrays: dict[str, Any] = {name: getattr(self, name) for name in names}
+        if self.bursts:
+            arrays["bursts"] = np.stack([cube.data for cube in self.bursts])
+            arrays["burst_mid_offset_s"] = [cube.mid_offset_s for cube in self.bursts]
         weather = None if self.weather is None else self.weather.to_array()
         save_npz(path, arrays | {"profile": self.profile.model_dump_json(), "weather": weather})
 
@@ -177,7 +189,7 @@ class RadarCube:
         from ..config.profile import RadarProfile
 
         arrays = load_npz(path, ("data", "profile", "range_window", "doppler_window", "n_fft"))
-        return cls(
+        whole = cls(
             data=arrays["data"].astype(np.complex128),
             profile=RadarProfile.model_validate(json.loads(str(arrays["profile"]))),
             range_window=str(arrays["range_window"]),
@@ -186,6 +198,15 @@ class RadarCube:
             noise_added=bool(arrays.get("noise_added", True)),
             weather=Weather.from_array(arrays["weather"]) if "weather" in arrays else None,
         )
+        if "bursts" not in arrays:
+            return whole
+        parts = zip(arrays["bursts"], whole.profile.bursts, arrays["burst_mid_offset_s"], strict=True)
+        n_fft = (whole.n_fft[0], arrays["bursts"].shape[2])
+        cubes = (
+            replace(whole, data=data.astype(np.complex128), profile=profile, n_fft=n_fft, mid_offset_s=float(offset))
+            for data, profile, offset in parts
+        )
+        return replace(whole, bursts=tuple(cubes))
 
 
 def bartlett_max(snapshots: ComplexArray, vectors: ComplexArray) -> FloatArray:
@@ -225,11 +246,12 @@ def process(
     Returns
     -------
     RadarCube
+        Of a profile with ``stagger: burst`` that of the whole frame, with one of each burst in ``bursts``.
 
     Raises
     ------
     InputError
-        Unknown window, or a transform shorter than the data.
+        Unknown window, a transform shorter than the data, or under DDM one that sub-bands do not divide.
     """
     profile = adc.profile
     w = profile.waveform
@@ -237,6 +259,11 @@ def process(
     if lengths[0] < w.samples or lengths[1] < w.chirps:
         raise InputError(
             f"process: n_fft {lengths} is shorter than the data; at least ({w.samples}, {w.chirps}) = (samples, loops)"
+        )
+    if lengths[1] % profile.n_subbands:
+        raise InputError(
+            f"process: n_fft {lengths}: multiplex ddm needs a Doppler transform of a multiple of the "
+            f"{profile.n_subbands} sub-bands"
         )
     ranges = range_spectrum(adc.data, name=range_window, n_fft=lengths[0], real=w.adc == "real")
     data = doppler_spectrum(
@@ -258,4 +285,16 @@ def process(
         noise_added=adc.noise_power_w > 0,
         weather=adc.weather,
         returns=adc.returns,
+        mid_offset_s=adc.mid_offset_s,
+        bursts=_bursts(adc, range_window, doppler_window, lengths),
+    )
+
+
+def _bursts(adc: AdcCube, range_window: str, doppler_window: str, n_fft: tuple[int, int]) -> tuple[RadarCube, ...]:
+    """Return the cubes of the bursts of a frame that has several, each with its share of the Doppler bins."""
+    if len(adc.bursts) == 1:
+        return ()
+    lengths = (n_fft[0], -(-n_fft[1] // len(adc.bursts)))
+    return tuple(
+        process(burst, range_window=range_window, doppler_window=doppler_window, n_fft=lengths) for burst in adc.bursts
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +13,15 @@ from ..constants import RCS_FLOOR_DBSM, SPEED_OF_LIGHT
 from ..errors import InputError
 from ..physics.link_budget import rcs_from_power
 from . import angle
+from .ambiguity import Look, Unfolding, other_looks, unfold
 from .cfar import cfar_threshold, default_window
 from .detections import DETECTION_DTYPE, Detections
+from .directions import coarse_direction, distinct, second_direction
 from .elements import Elements
+from .multiplex import strongest_alias
 from .refine import Axis, PeakFit, PeakPatch, at_peak, fit_peaks, without
 from .spectra import slow_time_offsets
+from .tdm_phase import unfold_by_phase
 from .truth import Attribution, attribute
 
 if TYPE_CHECKING:
@@ -24,12 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["detect", "local_maxima", "noise_threshold"]
 
-#: Elevation beams tried before the fit, across the visible sines.
-_ELEVATION_BEAMS = 33
 #: One-way pattern level below which the inverted radar equation stops.
 _PATTERN_FLOOR = 1e-6
-#: A second target in one range-Doppler cell: weakest power relative to the first, channels it takes to tell two.
-_SECOND_PART, _CHANNELS_FOR_TWO = 10**-1.2, 4
 #: Floor of the noise estimate of a cube that carries no noise, relative to the nominal noise: low enough that level
 #: tests find weak targets, high enough that rounding and far side lobes are none.
 _QUIET_FLOOR = 1e-4
@@ -37,11 +38,16 @@ _QUIET_FLOOR = 1e-4
 _SHORT, _TURNS = 2, 2
 
 
-def noise_threshold(cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca") -> FloatArray:
-    """Return the CFAR threshold of every range-Doppler cell, (n_range, n_velocity) [W]; arguments as :func:`detect`."""
+def noise_threshold(
+    cube: RadarCube, *, pfa: float = 1e-3, cfar: str = "ca", power: FloatArray | None = None
+) -> FloatArray:
+    """Return the CFAR threshold of every range-Doppler cell, (n_range, n_velocity) [W]; arguments as :func:`detect`.
+
+    ``power`` (n_range, n_velocity) takes the place of the cube's own map: what the threshold were over another one [W].
+    """
     w = cube.profile.waveform
     windows, lengths = (cube.range_window, cube.doppler_window), (w.samples, w.chirps)
-    power = cube.range_doppler
+    power = cube.range_doppler if power is None else power
     shape = default_window((power.shape[0], power.shape[1]), windows, lengths, cube.n_fft)
     return cfar_threshold(
         power,
@@ -81,19 +87,28 @@ def detect(
     cfar: str = "ca",
     blanking_m: float = 0.0,
     ambiguity: str | None = None,
+    previous: Detections | None = None,
+    interval_s: float | None = None,
 ) -> Detections:
     """Detect targets.
 
     Parameters
     ----------
     cube : RadarCube
+        Of several bursts the first is searched.
     pfa : float
         False alarms per range-Doppler cell on noise, window correlation and the sum over channels included.
     cfar : {"ca", "go", "so", "os"}
     blanking_m : float
         Cells nearer than this are not looked at [m].
-    ambiguity : None
-        Doppler unfolding; none is built in.
+    ambiguity : {None, "staggered", "two_frame", "tdm_phase"}
+        How to unfold velocities: by the bursts of a frame with ``stagger: burst``, by the range change since the
+        ``previous`` frame, or by the phases of transmitters that take turns. A row without a unique answer stays folded
+        and is marked ``ambiguous``.
+    previous : Detections, optional
+        Of an earlier frame of the same radar, for ``two_frame``; without them no row is unfolded.
+    interval_s : float, optional
+        Time from that frame to this one, for ``two_frame`` [s].
 
     Returns
     -------
@@ -103,24 +118,33 @@ def detect(
     Raises
     ------
     InputError
-        A value out of range, or an unknown method.
+        A value out of range, an unknown method, or one that this cube or interval does not allow.
 
     Notes
     -----
     Velocity: the Doppler frequency of an echo is (2 v / c)(f_c - k tau), so v follows with the echo's own delay.
     Range: the beat frequency is k tau + Doppler; the coupling is removed with the reported velocity.
     """
-    if ambiguity is not None:
-        raise InputError(f"detect: unknown ambiguity {ambiguity!r}; allowed: None")
     if not blanking_m >= 0:
         raise InputError(f"detect: blanking_m must be >= 0, got {blanking_m}")
+    again = partial(detect, pfa=pfa, cfar=cfar, blanking_m=blanking_m)
+    others = None if ambiguity is None else other_looks(cube, ambiguity, previous, interval_s, again)
+    cube = cube.bursts[0] if cube.bursts else cube
     power = cube.range_doppler
     threshold = noise_threshold(cube, pfa=pfa, cfar=cfar)
     hits = power > threshold
     hits &= (cube.range_m >= blanking_m)[:, None]
-    row, column = np.nonzero(hits & local_maxima(power))
+    row, column = np.nonzero(hits & local_maxima(power) & strongest_alias(power, cube.profile.n_subbands))
     peaks = _estimate(cube, row, column, threshold)
     table, chain, ghost = _table(cube, peaks)
+    if others is not None:
+        if ambiguity == "tdm_phase":
+            found = unfold_by_phase(cube, table["velocity"], peaks.cells, partial(_turned, cube))
+        else:
+            found = unfold(Look(table, cube.profile, 0.0, cube.mid_offset_s), others)
+        peaks, resolved = _unfolded(cube, peaks, found, threshold)
+        table, chain, ghost = _table(cube, peaks)
+        table["ambiguous"] |= ~resolved
     order = np.argsort(-table["power"], kind="stable")
     order = order[table["range"][order] > 0]
     return Detections(table[order], int(hits.sum()), chain[order], ghost[order])
@@ -128,11 +152,13 @@ def detect(
 
 @dataclass(frozen=True)
 class _Peaks:
-    """Peak cells and what was fitted there; one cell may hold several."""
+    """Peak cells and what was fitted there; one cell may hold several. ``fold``: multiples of 2 v_max to add."""
 
     row: IntArray
     column: IntArray
     fit: PeakFit
+    fold: IntArray
+    cells: ComplexArray  # (n, n_virtual) the peak cells, channels turned to one time
 
 
 def _axes(cube: RadarCube) -> tuple[Axis, Axis]:
@@ -148,29 +174,66 @@ def _axes(cube: RadarCube) -> tuple[Axis, Axis]:
     return axes[0], axes[1]
 
 
-def _estimate(cube: RadarCube, row: IntArray, column: IntArray, threshold: FloatArray) -> _Peaks:
+def _estimate(
+    cube: RadarCube, row: IntArray, column: IntArray, threshold: FloatArray, fold: IntArray | None = None
+) -> _Peaks:
     """Fit one point target to every peak cell, and a second one where another direction stands out clearly."""
     p = cube.profile
+    fold = np.zeros_like(row) if fold is None else fold
     elements = Elements(p.tx_m, p.rx_m, p.wavelength_m, cube.range_step_m)
-    base = row * cube.range_step_m - _coupling_m(cube, column - cube.n_fft[1] // 2)
-    turn = 2 * np.pi * slow_time_offsets(p.chirp_start_s) / (cube.n_fft[1] * p.loop_period_s)
-    code = cube.loop_code
-    sine, elevation = _coarse_direction(cube, cube.data[row, column])
-    axes = _axes(cube)
-    patch = PeakPatch.cut(cube.data, row, column, axes, turn, code)
+    base = row * cube.range_step_m - _coupling_m(cube, column - cube.n_fft[1] // 2 + fold * cube.n_fft[1])
+    snapshots = _turned(cube, cube.data[row, column], fold)
+    sine, elevation = coarse_direction(cube, snapshots)
+    patch = _patch(cube, row, column, fold)
     fit = fit_peaks(patch, elements, base, sine=sine, sine_elevation=elevation)
-    if code is not None:
-        patch = PeakPatch.cut(cube.data, row, column, axes, turn, code, fit.doppler_bin)
+    if cube.loop_code is not None:
+        patch = _patch(cube, row, column, fold, fit.doppler_bin)
         fit = _refit(patch, elements, base, fit)
-    rest = cube.data[row, column] - at_peak(patch, elements, base, fit)
-    which, sine, elevation = _second_direction(cube, rest, fit, threshold[row, column])
+    rest = snapshots - at_peak(patch, elements, base, fit)
+    which, sine, elevation = second_direction(cube, rest, fit, threshold[row, column])
     if not len(which):
-        return _Peaks(row, column, fit)
+        return _Peaks(row, column, fit, fold, snapshots)
     pair = _fit_pair(patch.part(which), elements, base[which], fit.part(which), sine, elevation)
-    kept = _distinct(cube, *pair)
+    kept = distinct(cube, *pair)
     which, pair = which[kept], (pair[0].part(kept), pair[1].part(kept))
     every = fit.replaced(which, pair[0]).joined(pair[1])
-    return _Peaks(np.concatenate([row, row[which]]), np.concatenate([column, column[which]]), every)
+    row, column, fold, snapshots = (np.concatenate([a, a[which]]) for a in (row, column, fold, snapshots))
+    return _Peaks(row, column, every, fold, snapshots)
+
+
+def _unfolded(cube: RadarCube, peaks: _Peaks, found: Unfolding, threshold: FloatArray) -> tuple[_Peaks, BoolArray]:
+    """Give peaks their folds; where chirps of a loop take turns, directions are estimated again with them."""
+    if cube.profile.n_chirps_per_loop == 1 or not found.fold.any():
+        return replace(peaks, fold=found.fold), found.resolved
+    # one answer a cell, that of its first target: the directions that made two of it were those of a fold
+    cells = peaks.row * cube.n_fft[1] + peaks.column
+    unique, first = np.unique(cells, return_index=True)
+    peaks = _estimate(cube, peaks.row[first], peaks.column[first], threshold, found.fold[first])
+    cells = peaks.row * cube.n_fft[1] + peaks.column
+    return peaks, found.resolved[first[np.searchsorted(unique, cells)]]
+
+
+def _turn(cube: RadarCube) -> FloatArray:
+    """Return the phase of each channel per Doppler bin by its later start, (n_virtual,) [rad]."""
+    p = cube.profile
+    return 2 * np.pi * slow_time_offsets(p.chirp_start_s) / (cube.n_fft[1] * p.loop_period_s)
+
+
+def _turned(cube: RadarCube, channels: ComplexArray, fold: IntArray) -> ComplexArray:
+    """Return (n, ..., n_virtual) channels compensated for velocities ``fold`` (n,) times 2 v_max farther."""
+    if not fold.any():
+        return channels
+    farther = (fold * cube.n_fft[1]).reshape(-1, *(1,) * (channels.ndim - 1))
+    turned = channels * np.exp(-1j * farther * _turn(cube))
+    return turned if cube.loop_code is None else cube.loop_code.decode_anew(turned, farther[..., 0])
+
+
+def _patch(
+    cube: RadarCube, row: IntArray, column: IntArray, fold: IntArray, doppler_bin: FloatArray | None = None
+) -> PeakPatch:
+    """Cut the cells around peaks, compensated for their folds."""
+    patch = PeakPatch.cut(cube.data, row, column, _axes(cube), _turn(cube), cube.loop_code, doppler_bin)
+    return replace(patch, cells=_turned(cube, patch.cells, fold))
 
 
 def _coupling_m(cube: RadarCube, doppler_bin: FloatArray | IntArray) -> FloatArray:
@@ -204,58 +267,11 @@ def _fit_pair(
     return first, second
 
 
-def _coarse_direction(cube: RadarCube, snapshots: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return the direction cosines of the strongest beam: azimuth by the widest row, then elevation by all channels."""
-    p = cube.profile
-    vectors = angle.steering(p.positions_m[cube.azimuth_channels], p.wavelength_m, cube.azimuth_sine)
-    sine = cube.azimuth_sine[np.argmax(angle.bartlett(snapshots[:, cube.azimuth_channels], vectors), axis=1)]
-    elevation = np.zeros(len(sine))
-    if angle.has_elevation(p.positions_m, p.wavelength_m) and len(sine):
-        tried = np.linspace(-1, 1, _ELEVATION_BEAMS) * np.sqrt(1 - sine**2)[:, None]
-        steered = angle.steering(p.positions_m, p.wavelength_m, sine[:, None], tried)
-        beams = np.abs(np.einsum("pkc,pc->pk", steered.conj(), snapshots))
-        elevation = tried[np.arange(len(sine)), np.argmax(beams, axis=1)]
-    return sine, elevation
-
-
-def _second_direction(
-    cube: RadarCube, rest: ComplexArray, fit: PeakFit, threshold: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return peaks whose cell holds another direction when the fitted target is taken out, and that direction.
-
-    It must stand a beam away, above the threshold, and no more than 12 dB below the first: what a line of six leaves
-    of an extended or mismodelled target is weaker.
-    """
-    empty = np.zeros(0)
-    if len(cube.azimuth_channels) < _CHANNELS_FOR_TWO or not len(rest):
-        return np.zeros(0, dtype=np.int64), empty, empty
-    sine, elevation = _coarse_direction(cube, rest)
-    vectors = angle.steering(cube.profile.positions_m, cube.profile.wavelength_m, sine, elevation)
-    power = np.abs(np.einsum("pc,pc->p", vectors.conj(), rest) / rest.shape[1]) ** 2
-    clear = power > np.maximum(threshold, _SECOND_PART * np.abs(fit.amplitude) ** 2)
-    clear &= np.abs(sine - fit.sine) > _beam(cube)
-    which = np.flatnonzero(clear)
-    return which, sine[which], elevation[which]
-
-
-def _beam(cube: RadarCube) -> float:
-    """Return the resolution of the azimuth aperture in sine: 2/M of a half-wavelength line of M columns."""
-    aperture = float(np.ptp(cube.profile.positions_m[cube.azimuth_channels, 1]))
-    return 2 / (2 * aperture / cube.profile.wavelength_m + 1)
-
-
-def _distinct(cube: RadarCube, first: PeakFit, second: PeakFit) -> IntArray:
-    """Return the pairs that stayed a beam apart and did not blow up against each other."""
-    strong, weak = np.abs(first.amplitude) ** 2, np.abs(second.amplitude) ** 2
-    apart = np.abs(first.sine - second.sine) > 0.8 * _beam(cube)
-    return np.flatnonzero(apart & (weak > _SECOND_PART * strong) & (weak < 2 * strong))
-
-
 def _table(cube: RadarCube, peaks: _Peaks) -> tuple[np.ndarray[tuple[int], np.dtype[np.void]], NDArray[Any], BoolArray]:
     """Turn fitted peaks into rows, with their chains and whether they are ghosts."""
     p = cube.profile
     fit = peaks.fit
-    column = peaks.column - cube.n_fft[1] // 2 + fit.doppler_bin
+    column = peaks.column + (peaks.fold * cube.n_fft[1] - cube.n_fft[1] // 2) + fit.doppler_bin
     doppler_hz = column / (cube.n_fft[1] * p.loop_period_s)
     distance = (peaks.row + fit.range_bin) * cube.range_step_m - _coupling_m(cube, column)
     if p.waveform.adc == "complex":
@@ -263,6 +279,7 @@ def _table(cube: RadarCube, peaks: _Peaks) -> tuple[np.ndarray[tuple[int], np.dt
         distance = np.where(distance > 0, distance, distance + cube.range_step_m * cube.n_fft[0])
     tau = 2 * distance / SPEED_OF_LIGHT
     velocity = doppler_hz * SPEED_OF_LIGHT / (2 * (p.center_hz - p.slope_hz_per_s * tau))
+    distance = distance - velocity * cube.mid_offset_s
     elevation = np.arcsin(fit.sine_elevation)
     azimuth = np.arcsin(np.clip(fit.sine / np.maximum(np.cos(elevation), 1e-9), -1, 1))
     valid = angle.has_elevation(p.positions_m, p.wavelength_m)
@@ -278,21 +295,21 @@ def _table(cube: RadarCube, peaks: _Peaks) -> tuple[np.ndarray[tuple[int], np.dt
     if cube.returns is not None:
         truth = attribute(cube, cube.returns, peaks.row, peaks.column, fit.sine, fit.sine_elevation)
         table["object_id"], table["tag"] = truth.object_id, truth.tag
-        table["ambiguous"] = _folded(cube, truth)
+        table["ambiguous"] = _folded(cube, truth, velocity)
         return table, truth.chain, truth.ghost
     table["object_id"] = -1
     return table, np.full(len(table), ""), np.zeros(len(table), dtype=bool)
 
 
-def _folded(cube: RadarCube, truth: Attribution) -> BoolArray:
-    v_max = cube.profile.max_velocity_mps
-    return np.asarray((truth.object_id >= 0) & ((truth.velocity < -v_max) | (truth.velocity >= v_max)))
+def _folded(cube: RadarCube, truth: Attribution, velocity: FloatArray) -> BoolArray:
+    """Tell which reported velocities are a multiple of 2 v_max off the truth."""
+    return np.asarray((truth.object_id >= 0) & (np.abs(velocity - truth.velocity) > cube.profile.max_velocity_mps))
 
 
 def _snr_db(cube: RadarCube, peaks: _Peaks) -> FloatArray:
     """Return the power of the peak cell, beamformed to the fitted direction, over the expected noise in it [dB]."""
     p = cube.profile
-    beams = np.einsum("pc,pc->p", peaks.fit.phasor.conj(), cube.data[peaks.row, peaks.column]) / p.n_virtual
+    beams = np.einsum("pc,pc->p", peaks.fit.phasor.conj(), peaks.cells) / p.n_virtual
     with np.errstate(divide="ignore"):
         return np.asarray(10 * np.log10(np.abs(beams) ** 2 / (cube.noise_power_w / p.n_virtual)))
 

@@ -158,7 +158,7 @@ class Detections:
 
     @property
     def ambiguous(self) -> BoolArray:
-        """(n,) bool, the reported velocity is known to be folded, and the range is off by its coupling."""
+        """(n,) bool, velocity known to be folded and range off by its coupling, or unfolding found no answer."""
         return np.asarray(self.table["ambiguous"])
 
     @property

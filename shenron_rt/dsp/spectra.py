@@ -23,8 +23,8 @@ def range_spectrum(samples: ComplexArray, *, name: str, n_fft: int, real: bool) 
     n_fft : int
         Length of the transform, >= n.
     real : bool
-        The imaginary part is empty: keep the positive half and scale by sqrt(2), so that the tone sqrt(2) Re(x) reads
-        like x.
+        The samples are those of a real converter, turned by a phase for each chirp at most: keep the positive half and
+        scale by sqrt(2), so that the tone sqrt(2) Re(x) reads like x.
 
     Returns
     -------
@@ -33,6 +33,9 @@ def range_spectrum(samples: ComplexArray, *, name: str, n_fft: int, real: bool) 
     """
     w = window(name, samples.shape[-1])
     taper = w / w.sum()
+    if real and np.any(samples.imag):
+        whole = sp_fft.fft(samples * (np.sqrt(2.0) * taper), n_fft, axis=-1, overwrite_x=True)
+        return np.asarray(whole[..., : n_fft // 2], dtype=np.complex128)
     if real:
         half = sp_fft.rfft(samples.real * (np.sqrt(2.0) * taper), n_fft, axis=-1)
         return np.asarray(half[..., : n_fft // 2], dtype=np.complex128)

@@ -128,6 +128,7 @@ def path_amplitude(
         link = link_amplitude(profile, 0.5 * part.way[:, None] * part.arrival, weather, departure=part.departure)
         # a metal plate has Gamma = -1, and its current the sign of what arrives
         sigma_root = -wavenumber / (2.0 * math.sqrt(math.pi)) * strength * integral
+        sigma_root = np.where(np.isnan(part.rcs), sigma_root, np.sqrt(part.rcs) * strength)
         # the one conjugation from e^{+jwt} echo phasors to the de-chirped signal conj(rx) tx
         return np.asarray(np.conj(link * profile.wavelength_m / math.sqrt(FOUR_PI_CUBED) * sigma_root / (there * back)))
 
@@ -137,7 +138,10 @@ def path_amplitude(
 def _strength(
     paths: Paths, unit: FloatArray, materials: list[Material], frequency_hz: float, polarization: str
 ) -> ComplexArray:
-    """Return (n,) what the footprint that radiates sends back for a unit of u and v [m^2]."""
+    """Return (n,) what the footprint that radiates sends back for a unit of u and v [m^2].
+
+    Of a point target: the share of its sqrt(RCS) that mirrors and polarisation leave.
+    """
     receive, send = ("VH".index(letter) for letter in polarization)
     row = np.arange(len(paths))
     ends, last = paths.radiates.astype(np.int64), paths.count.astype(np.int64) - 1
@@ -155,7 +159,11 @@ def _strength(
         ear[rows] = _reflected(paths, rows, order, ear[rows], -unit[rows, order + 1], materials, frequency_hz)
     pair = [np.repeat(f, 2, axis=1) for f in (arriving, leaving, ear)]  # radiated() takes V and H
     toward, d, n = unit[row, ends + 1], unit[row, ends], paths.normal[row, ends]
-    return np.asarray(radiated(pair[0], pair[1], d, n, paths.area, toward, pair[2])[:, 0, 0])
+    strength = radiated(pair[0], pair[1], d, n, paths.area, toward, pair[2])[:, 0, 0]
+    # a point target returns V of each direction as V of any other, and H as H
+    there, back = _basis(d), _basis(-toward)
+    alike = np.einsum("ni,npi,nj,npj->n", arriving[:, 0], there, ear[:, 0], back)
+    return np.where(np.isnan(paths.rcs), strength, alike)
 
 
 def _reflected(

@@ -29,7 +29,7 @@ from ..config.profile import RadarProfile
 from ..errors import InputError, NotFoundError, did_you_mean
 from ..synthesis.adc import AdcCube
 from ..synthesis.receiver import cube_noise_power
-from ..synthesis.signal import hadamard
+from ..synthesis.signal import decode, hadamard
 from .npz import atomic_write
 
 __all__ = ["Layout", "count_scale", "noise_floor_scale", "read_dca1000", "read_npy", "write_dca1000"]
@@ -278,6 +278,8 @@ def _pack(chirps: ComplexArray, parts: int, layout: Layout) -> FloatArray:
 def _to_virtual(chirps: ComplexArray, profile: RadarProfile) -> ComplexArray:
     """Return (loop, virtual, sample) from the (chirp, rx, sample) of one frame."""
     shape = (profile.waveform.chirps, profile.n_virtual, profile.waveform.samples)
+    if profile.array.multiplex == "ddm":
+        return decode(profile, chirps[:, None])
     if profile.array.multiplex != "bpm":
         return chirps.reshape(shape)
     block = chirps.reshape(shape[0], profile.n_tx, -1)
@@ -288,6 +290,8 @@ def _to_virtual(chirps: ComplexArray, profile: RadarProfile) -> ComplexArray:
 def _to_chirps(data: ComplexArray, profile: RadarProfile) -> ComplexArray:
     """Return (chirp, rx, sample) of one frame from (loop, virtual, sample): the inverse of :func:`_to_virtual`."""
     shape = _chirp_shape(profile)
+    if profile.array.multiplex == "ddm":  # the first transmitter has no ramp: its channels are the receivers
+        return data[:, : profile.n_rx]
     if profile.array.multiplex != "bpm":
         return data.reshape(shape)
     block = data.reshape(shape[0] // profile.n_tx, profile.n_tx, -1)

@@ -41,9 +41,10 @@ from .canonical import (
 )
 from .energy import diffuse_albedo, diffuse_budget, limit_sigma0
 from .fresnel import SlabCoefficients, backscatter_reflection, fresnel, fresnel_cos, layered, slab
-from .link_budget import noise_power, rcs_from_power, received_power, snr
+from .link_budget import noise_power, one_way_power, rcs_from_power, received_power, snr
 from .noise import noise_power_per_sample
 from .permittivity import cole_cole_permittivity, conductor_permittivity, p2040_permittivity, water_permittivity
+from .phase_noise import dechirped_phase_noise, single_sideband_level
 from .roughness import coherent_factor, rayleigh_height
 from .two_ray import four_path_factor, two_ray_factor
 
@@ -63,6 +64,7 @@ __all__ = [
     "constant_gamma",
     "cylinder_amplitude",
     "cylinder_rcs",
+    "dechirped_phase_noise",
     "diffuse_albedo",
     "diffuse_budget",
     "dihedral_rcs",
@@ -92,6 +94,7 @@ __all__ = [
     "near_range_trihedral_rcs",
     "noise_power",
     "noise_power_per_sample",
+    "one_way_power",
     "p2040_permittivity",
     "plate_amplitude",
     "plate_rcs",
@@ -100,6 +103,7 @@ __all__ = [
     "rayleigh_height",
     "rcs_from_power",
     "received_power",
+    "single_sideband_level",
     "slab",
     "small_perturbation",
     "snr",

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..constants import BOLTZMANN, FOUR_PI_CUBED, T0
 
-__all__ = ["noise_power", "rcs_from_power", "received_power", "snr"]
+__all__ = ["noise_power", "one_way_power", "rcs_from_power", "received_power", "snr"]
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +51,36 @@ def received_power(
         / (FOUR_PI_CUBED * np.asarray(loss))
     )
     return np.asarray(scale * np.asarray(rcs_m2) / r**4)
+
+
+def one_way_power(
+    range_m: ArrayLike,
+    wavelength_m: ArrayLike,
+    tx_power_w: ArrayLike,
+    gain_tx: ArrayLike,
+    gain_rx: ArrayLike,
+    loss: ArrayLike = 1.0,
+) -> FloatArray:
+    """Return Friis' P = Pt Gt Gr (lambda/(4 pi R))^2/L, what one antenna gets from another.
+
+    Parameters
+    ----------
+    range_m, wavelength_m : array_like
+        Distance, > 0, and wavelength. [m]
+    tx_power_w : array_like
+        Transmit power. [W]
+    gain_tx, gain_rx : array_like
+        Linear gains towards each other. [-]
+    loss : array_like
+        Linear loss of the one way, >= 1. [-]
+
+    Returns
+    -------
+    array of the broadcast shape [W]
+    """
+    spread = np.asarray(wavelength_m) / (4 * np.pi * np.asarray(range_m, dtype=np.float64))
+    gain = np.asarray(gain_tx) * np.asarray(gain_rx) / np.asarray(loss)
+    return np.asarray(np.asarray(tx_power_w) * gain * spread**2, dtype=np.float64)
 
 
 def rcs_from_power(

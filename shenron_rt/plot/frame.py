@@ -48,6 +48,7 @@ def write_pictures(
     from ..dsp import noise_threshold
 
     cube, found = frame.cube, frame.detections
+    searched = cube.bursts[0] if cube.bursts else cube
     returns = getattr(frame, "returns", None)
     truth = truth_of(returns, names)
     if returns is not None and not returns.calibrated:
@@ -55,9 +56,9 @@ def write_pictures(
     head = f"{title} \u2013 " if title else ""
     figures = {
         "range_profile": range_profile(
-            cube,
+            searched,
             found,
-            threshold=noise_threshold(cube, pfa=cube.profile.processing.pfa),
+            threshold=noise_threshold(searched, pfa=cube.profile.processing.pfa),
             truth=truth,
             title=f"{head}range profile",
         ),

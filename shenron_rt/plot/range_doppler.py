@@ -21,7 +21,7 @@ _MAX_LABELS = 6
 def range_doppler(
     cube: RadarCube, detections: Detections | None = None, *, truth: Sequence[Truth] = (), title: str = ""
 ) -> Figure:
-    """Draw power over range rate and range, objects as crosses at their folded velocity.
+    """Draw power over range rate and range, detections and objects (as crosses) at their folded velocity.
 
     Parameters
     ----------
@@ -46,7 +46,8 @@ def range_doppler(
         extent=(v[0] - dv / 2, v[-1] + dv / 2, -dr / 2, r[-1] + dr / 2),
     )  # fmt: skip
     if detections is not None and len(detections):
-        ring(axes, detections.velocity, detections.range, detections.ghost, size=10)
+        span = len(v) * dv  # an unfolded velocity may lie beyond the axis
+        ring(axes, (detections.velocity - v[0]) % span + v[0], detections.range, detections.ghost, size=10)
     axes.set_xlim(v[0] - dv / 2, v[-1] + dv / 2)
     axes.set_ylim(0, r[-1] + dr / 2)
     taken: list[tuple[float, float]] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -26,7 +26,8 @@ class AdcCube:
     Parameters
     ----------
     data : (n_loops, n_virtual, n_samples) complex128
-        sqrt(W) RMS at the receiver input; virtual = tx * n_rx + rx. A real ADC leaves the imaginary part zero.
+        sqrt(W) RMS at the receiver input; virtual = tx * n_rx + rx. A real ADC leaves the imaginary part zero, but for
+        DDM: there every channel is its receiver, turned back by the ramp of its transmitter.
     profile : RadarProfile
         The radar that made it; all axes derive from it.
     noise_power_w : float
@@ -37,6 +38,8 @@ class AdcCube:
         Whose attenuation the samples have, for the RCS of detections.
     returns : Returns or None
         The echoes behind it, for truth attribution; not saved with the cube.
+    mid_offset_s : float
+        Middle of its chirps after mid-frame; 0 but for one burst of a frame [s].
     """
 
     dims: ClassVar[tuple[str, str, str]] = ("chirp", "antenna", "sample")
@@ -48,6 +51,7 @@ class AdcCube:
     frame: int = 0
     weather: Weather | None = None
     returns: Returns | None = field(default=None, repr=False)
+    mid_offset_s: float = 0.0
 
     def __post_init__(self) -> None:
         w = self.profile.waveform
@@ -70,6 +74,19 @@ class AdcCube:
     def positions_m(self) -> FloatArray:
         """(n_virtual, 3) tx + rx positions (two-way sum) from the mount origin [m]."""
         return self.profile.positions_m
+
+    @property
+    def bursts(self) -> tuple[AdcCube, ...]:
+        """The bursts of the frame as cubes of their own, each with the one interval of its chirps."""
+        if len(self.profile.bursts) == 1:
+            return (self,)
+        loops, parts = self.profile.bursts[0].waveform.chirps, []
+        for i, profile in enumerate(self.profile.bursts):
+            rows = slice(i * loops, (i + 1) * loops)
+            begin = float(self.chirp_start_s[rows].min())
+            offset = begin + profile.frame_mid_s - self.profile.frame_mid_s
+            parts.append(replace(self, data=self.data[rows], profile=profile, mid_offset_s=offset))
+        return tuple(parts)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save data, axes and the whole profile to an ``.npz`` file."""

@@ -12,7 +12,7 @@ from ..config.profile import RadarProfile
 from ..errors import InputError
 from ..returns import Returns
 
-__all__ = ["Clock", "Field", "Points", "decode", "hadamard", "transmitted"]
+__all__ = ["Clock", "Field", "Points", "decode", "doppler_ramps", "hadamard", "transmitted"]
 
 
 @dataclass(frozen=True)
@@ -136,10 +136,10 @@ class Clock:
     frame_mid_s: float
 
     @classmethod
-    def of(cls, profile: RadarProfile) -> Clock:
-        """Read the clock of a profile."""
+    def of(cls, profile: RadarProfile, margin: int = 0) -> Clock:
+        """Read the clock of a profile; ``margin`` more samples on both sides."""
         w = profile.waveform
-        times = w.adc_start_s + np.arange(w.samples) / w.sample_rate_hz
+        times = w.adc_start_s + np.arange(-margin, w.samples + margin) / w.sample_rate_hz
         return cls(w.carrier_hz, w.slope_hz_per_s, times, profile.frame_mid_s)
 
     @property
@@ -176,7 +176,13 @@ def hadamard(n: int) -> FloatArray:
     return matrix
 
 
-def transmitted(profile: RadarProfile, points: Points, field: Field) -> ComplexArray:
+def doppler_ramps(profile: RadarProfile) -> ComplexArray:
+    """Return (n_loops, n_tx) phasors e^{j 2 pi i m / n_subbands} of transmitter i in chirp m under DDM, de-chirped."""
+    turns = np.outer(np.arange(profile.waveform.chirps), np.arange(profile.n_tx)) % profile.n_subbands
+    return np.asarray(np.exp(2j * np.pi / profile.n_subbands * turns), dtype=np.complex128)
+
+
+def transmitted(profile: RadarProfile, points: Points, field: Field, margin: int = 0) -> ComplexArray:
     """Return what the ADC sees before noise, chirp by chirp.
 
     Parameters
@@ -185,28 +191,37 @@ def transmitted(profile: RadarProfile, points: Points, field: Field) -> ComplexA
     points : Points
     field : callable
         Sums the echoes of one transmitter; see :data:`Field`.
+    margin : int
+        Samples to add before and after the sampled window.
 
     Returns
     -------
-    (n_loops, n_blocks, n_rx, n_samples) complex
-        Blocks are transmitters (simultaneous and TDM) or the chirps of a loop, in which all transmit (BPM). sqrt(W).
+    (n_loops, n_blocks, n_rx, n_samples + 2 margin) complex
+        Blocks are transmitters (simultaneous and TDM), the chirps of a loop, in which all transmit (BPM), or the one
+        chirp in which all transmit (DDM). sqrt(W).
     """
-    clock, starts = Clock.of(profile), profile.raw_chirp_start_s
-    shape = (len(starts), profile.n_tx, profile.n_rx, len(clock.sample_s))
+    clock, starts = Clock.of(profile, margin), profile.raw_chirp_start_s
+    kind = profile.array.multiplex
+    shape = (len(starts), 1 if kind == "ddm" else profile.n_tx, profile.n_rx, len(clock.sample_s))
     raw = np.zeros(shape, dtype=np.complex128)
-    bpm = profile.array.multiplex == "bpm"
-    code = hadamard(profile.n_tx) if bpm else np.eye(profile.n_tx)
+    code = hadamard(profile.n_tx) if kind == "bpm" else np.eye(profile.n_tx)
+    ramp = doppler_ramps(profile) if kind == "ddm" else None
     for i, tx in enumerate(profile.tx_m):
-        if bpm:
+        if ramp is not None:
+            raw[:, 0] += ramp[:, i, None, None] * field(clock, points, tx, profile.rx_m, starts[:, 0])
+        elif kind == "bpm":
             echo = field(clock, points, tx, profile.rx_m, starts.ravel()).reshape(shape)
             raw += code[None, :, i, None, None] * echo
         else:
-            raw[:, i] = field(clock, points, tx, profile.rx_m, starts[:, i if profile.array.multiplex == "tdm" else 0])
+            raw[:, i] = field(clock, points, tx, profile.rx_m, starts[:, i if kind == "tdm" else 0])
     return raw
 
 
 def decode(profile: RadarProfile, raw: ComplexArray) -> ComplexArray:
-    """Turn raw chirps into virtual channels: (1/n_tx) sum_b H[b, i] raw_b under BPM, else a reshape.
+    """Turn raw chirps into virtual channels.
+
+    (1/n_tx) sum_b H[b, i] raw_b under BPM; under DDM every receiver once for each transmitter, turned back by its ramp,
+    so that this transmitter's echo stands at its Doppler frequency and the others whole sub-bands away; else a reshape.
 
     Parameters
     ----------
@@ -219,4 +234,6 @@ def decode(profile: RadarProfile, raw: ComplexArray) -> ComplexArray:
     """
     if profile.array.multiplex == "bpm":
         raw = np.einsum("bi,mbjn->mijn", hadamard(profile.n_tx) / profile.n_tx, raw)
+    elif profile.array.multiplex == "ddm":
+        raw = raw * doppler_ramps(profile).conj()[:, :, None, None]
     return np.ascontiguousarray(raw.reshape(raw.shape[0], -1, raw.shape[-1]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from ..randomness import frame_generator
 from ..returns import Returns
 from .adc import AdcCube
 from .direct import direct_field
+from .interference import HeardRadar, add_interference
 from .nufft import nufft_field
+from .phase_noise import add_phase_noise, margin_samples
 from .receiver import add_noise, cube_noise_power, quantise, to_adc
 from .signal import Points, decode, hadamard, transmitted
 
@@ -40,6 +42,7 @@ def synthesize(
     accuracy: float = 1e-5,
     method: str = "nufft",
     radar: str = "",
+    interference: Sequence[HeardRadar] = (),
 ) -> AdcCube:
     """Synthesise the ADC samples of one frame.
 
@@ -49,7 +52,7 @@ def synthesize(
         Echoes in the radar frame, mid-frame. None at all gives noise alone.
     profile : RadarProfile
     noise : "thermal" or None
-        Thermal noise k T0 F f_s per complex sample, or none.
+        Thermal noise k T0 F f_s per complex sample, and the profile's phase noise; or neither.
     seed : int, optional
         Seed of the noise; None is 0.
     frame : int
@@ -60,6 +63,8 @@ def synthesize(
         ``"direct"`` is the reference sum, about 50 ns for every echo and sample.
     radar : str
         Name of the radar, so that several radars of one frame get noise of their own.
+    interference : sequence of HeardRadar
+        Other radars that send meanwhile, as ``heard_radars`` finds them in a scene.
 
     Returns
     -------
@@ -77,8 +82,10 @@ def synthesize(
     tau = (abs(p - tx) + abs(p - rx)) / c at the instant of the sample, p = position + velocity (T - mid-frame).
     """
     _check(profile, noise, accuracy, method)
-    clean = _clean(profile, returns, accuracy, method)
-    return _received(profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar)
+    clean = _clean(profile, returns, accuracy, method, _margin(profile, noise))
+    return _received(
+        profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar, interference=interference
+    )
 
 
 def synthesize_segments(
@@ -92,6 +99,7 @@ def synthesize_segments(
     accuracy: float = 1e-5,
     method: str = "nufft",
     radar: str = "",
+    interference: Sequence[HeardRadar] = (),
 ) -> AdcCube:
     """Synthesise the ADC samples of a frame whose echoes are known at several instants.
 
@@ -103,7 +111,7 @@ def synthesize_segments(
         Of the whole frame.
     returns : Returns
         At mid-frame, for the truth that the cube carries.
-    noise, seed, frame, accuracy, method, radar
+    noise, seed, frame, accuracy, method, radar, interference
         As for :func:`synthesize`; noise and receiver are those of the whole frame.
 
     Raises
@@ -112,17 +120,28 @@ def synthesize_segments(
         As :func:`synthesize`, or segments that are not the frame's loops.
     """
     _check(profile, noise, accuracy, method)
-    clean = np.concatenate([_clean(part, echoes, accuracy, method) for part, echoes in segments])
+    margin = _margin(profile, noise)
+    clean = np.concatenate([_clean(part, echoes, accuracy, method, margin) for part, echoes in segments])
     if len(clean) != profile.waveform.chirps:
         raise InputError(
             f"segments of {len(clean)} loops in all; the frame of {profile.name!r} has {profile.waveform.chirps}"
         )
-    return _received(profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar)
+    return _received(
+        profile, clean, returns, noise=noise, seed=seed, frame=frame, radar=radar, interference=interference
+    )
 
 
-def _clean(profile: RadarProfile, returns: Returns, accuracy: float, method: str) -> ComplexArray:
+def _clean(profile: RadarProfile, returns: Returns, accuracy: float, method: str, margin: int) -> ComplexArray:
     points = Points.from_returns(returns)
-    return transmitted(profile, points, direct_field) if method == "direct" else _fast(profile, points, accuracy)
+    if method == "direct":
+        return transmitted(profile, points, direct_field, margin)
+    return _fast(profile, points, accuracy, margin)
+
+
+def _margin(profile: RadarProfile, noise: str | None) -> int:
+    """Return the samples that phase noise needs beside those of a chirp."""
+    shaky = noise is not None and profile.receiver.phase_noise_dbc_hz is not None
+    return margin_samples(profile) if shaky else 0
 
 
 def _received(
@@ -134,9 +153,14 @@ def _received(
     seed: int | None,
     frame: int,
     radar: str,
+    interference: Sequence[HeardRadar],
 ) -> AdcCube:
     """Return what the receiver makes of the noise-free chirps."""
     seed = 0 if seed is None else int(seed)
+    if noise is not None and profile.receiver.phase_noise_dbc_hz is not None:
+        points, margin = Points.from_returns(returns), _margin(profile, noise)
+        clean = add_phase_noise(profile, points, clean, margin, frame_generator(seed, frame, radar, "phase noise"))
+    add_interference(profile, clean, interference)
     raw = to_adc(profile, clean)
     if noise is not None:
         add_noise(profile, raw, frame_generator(seed, frame, radar, "noise"))
@@ -145,22 +169,22 @@ def _received(
     return AdcCube(cube, profile, noise_power_w=power, seed=seed, frame=frame, weather=returns.weather, returns=returns)
 
 
-def _fast(profile: RadarProfile, points: Points, accuracy: float) -> ComplexArray:
+def _fast(profile: RadarProfile, points: Points, accuracy: float, margin: int) -> ComplexArray:
     """Sum by NUFFT; once more, finer, where the echoes cancel to a cube well below the sum of their powers.
 
     The error goes with the root of that sum. Echoes of unrelated phase give a cube of the same RMS; those of a smooth
     surface may leave far less.
     """
-    clean = transmitted(profile, points, nufft_field(accuracy))
-    # every raw chirp under BPM carries all transmitters
-    n_sent = profile.n_tx if profile.array.multiplex == "bpm" else 1
+    clean = transmitted(profile, points, nufft_field(accuracy), margin)
+    # every raw chirp under BPM and DDM carries all transmitters
+    n_sent = profile.n_tx if profile.array.multiplex in ("bpm", "ddm") else 1
     incoherent = np.sqrt(n_sent * np.sum(np.abs(points.amplitude) ** 2))
     rms = np.sqrt(np.mean(clean.real**2 + clean.imag**2))
     if rms >= CANCELLATION * incoherent:
         return clean
     finer = max(accuracy * float(rms / incoherent), ACCURACY_LIMIT)
     logger.debug("echoes cancel to %.3g of the root sum of their powers; accuracy %.3g", rms / incoherent, finer)
-    return transmitted(profile, points, nufft_field(finer))
+    return transmitted(profile, points, nufft_field(finer), margin)
 
 
 def _check(profile: RadarProfile, noise: str | None, accuracy: float, method: str) -> None:

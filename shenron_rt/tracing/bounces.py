@@ -23,7 +23,7 @@ from ..scene.world import World
 from .launch import Cells
 from .world_caster import WorldCaster
 
-__all__ = ["MIRROR_M2", "trace_paths"]
+__all__ = ["MIRROR_M2", "facing", "lifted", "reaches", "trace_paths"]
 
 #: Smallest flat piece of surface that counts as a mirror: larger than its Fresnel zone wherever a radar looks [m^2].
 MIRROR_M2 = 1.0
@@ -104,14 +104,15 @@ def trace_paths(
     return Paths.join(found)
 
 
-def _facing(world: World, face: IntArray, direction: FloatArray) -> FloatArray:
+def facing(world: World, face: IntArray, direction: FloatArray) -> FloatArray:
     """Return (n, 3) normals on the side that rays come from."""
     normal = world.face_normal[face]
     along = np.einsum("ij,ij->i", normal, direction)
     return normal * np.where(along > 0, -1.0, 1.0)[:, None]
 
 
-def _lifted(point: FloatArray, normal: FloatArray) -> FloatArray:
+def lifted(point: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return points (n, 3) a little above their surface, so that rays from there do not hit it."""
     height = _LIFT_M + _LIFT_PER_M * np.linalg.norm(point, axis=1)
     return np.asarray(point + height[:, None] * normal)
 
@@ -124,9 +125,9 @@ def _cast(caster: WorldCaster, origin: FloatArray, direction: FloatArray) -> Int
 def _bounced(world: World, caster: WorldCaster, tubes: _Tubes) -> _Tubes:
     """Return the tubes after one more reflection, those that hit something."""
     point = tubes.points[-1]
-    normal = _facing(world, tubes.faces[-1], tubes.direction)
+    normal = facing(world, tubes.faces[-1], tubes.direction)
     out = tubes.direction - 2.0 * np.einsum("ij,ij->i", tubes.direction, normal)[:, None] * normal
-    face = _cast(caster, _lifted(point, normal), out)
+    face = _cast(caster, lifted(point, normal), out)
     hit = np.flatnonzero(face >= 0)
     face, normal, out, tubes = face[hit], normal[hit], out[hit], tubes.select(hit)
     point = tubes.points[-1]
@@ -168,9 +169,9 @@ def _received(
     """Return the paths from the last hits of tubes to the radar at ``eye`` (n, 3), or its images in planes."""
     kept = _nearly_stationary(world, tubes, eye, wavenumber)
     tubes, eye = tubes.select(kept), eye[kept]
-    normal = _facing(world, tubes.faces[-1], tubes.direction)
+    normal = facing(world, tubes.faces[-1], tubes.direction)
     if plane is None:
-        free = _reaches(world, caster, _lifted(tubes.points[-1], normal), eye)
+        free = reaches(world, caster, lifted(tubes.points[-1], normal), eye)
     else:
         plane = plane[kept]
         free, back = _reflected_back(world, caster, tubes.points[-1], normal, eye, plane)
@@ -189,7 +190,7 @@ def _received(
     return _assembled(world, tubes, radiates, area, slope[flat], curvature[flat])
 
 
-def _reaches(world: World, caster: WorldCaster, start: FloatArray, end: FloatArray) -> IntArray:
+def reaches(world: World, caster: WorldCaster, start: FloatArray, end: FloatArray) -> IntArray:
     """Return the rows of pairs of points with nothing between them."""
     way = end - start
     length = np.linalg.norm(way, axis=1)
@@ -209,12 +210,12 @@ def _reflected_back(
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (world.face_offset[face] - np.einsum("ij,ij->i", normal, start)) / np.einsum("ij,ij->i", normal, way)
     where = start + np.nan_to_num(share)[:, None] * way
-    seen = _cast(caster, _lifted(start, side), way / np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None])
+    seen = _cast(caster, lifted(start, side), way / np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None])
     shown = (share > 0) & (share < 1) & (seen >= 0) & (world.face_plane[seen] == world.face_plane[face])
     rows = np.flatnonzero(shown)
-    towards = _facing(world, face[rows], where[rows])  # light from the radar arrives along ``where``
-    origin = _lifted(where[rows], towards)
-    return rows[_reaches(world, caster, origin, np.zeros_like(origin))], where
+    towards = facing(world, face[rows], where[rows])  # light from the radar arrives along ``where``
+    origin = lifted(where[rows], towards)
+    return rows[reaches(world, caster, origin, np.zeros_like(origin))], where
 
 
 def _share(world: World, tubes: _Tubes, normal: FloatArray, wavenumber: float) -> FloatArray:
@@ -242,7 +243,7 @@ def _footprint(normal: FloatArray, tubes: _Tubes) -> FloatArray:
 def _nearly_stationary(world: World, tubes: _Tubes, eye: FloatArray, wavenumber: float) -> IntArray:
     point = tubes.points[-1] - eye
     distance = np.linalg.norm(point, axis=1)
-    normal = _facing(world, tubes.faces[-1], tubes.direction)
+    normal = facing(world, tubes.faces[-1], tubes.direction)
     lit = np.einsum("ij,ij->i", normal, point) < 0  # the radar is on the side that is lit
     edges = _footprint(normal, tubes)
     slope = np.abs(np.einsum("nki,ni->nk", edges, tubes.direction + point / distance[:, None]))
@@ -309,4 +310,5 @@ def _assembled(
         area=area,
         slope=slope,
         curvature=curvature,
+        rcs=np.full(n, np.nan),
     )

@@ -14,7 +14,9 @@ from ..config._base import Placed
 from ..config.materials import MaterialTable
 from ..config.profile import RadarProfile
 from ..config.scene import Scene
+from ..constants import MOST_SCENE_BOUNCES
 from ..errors import InputError
+from ..paths import Paths
 from ..randomness import frame_generator
 from ..scatterers import Scatterers
 from ..scene.motion_of import point_state
@@ -25,13 +27,13 @@ from .backend import Backend, choose_backend
 from .launch import Cells, aimed_cells, pattern_cells, turned
 from .launches import Launch, launch_directions
 from .mirrors import bounced_paths, image_launches
+from .points import point_paths
 from .world_caster import WorldCaster, anchor
 
 __all__ = ["trace"]
 
 #: Cosines below this are treated as this: a surface seen edge-on has no usable footprint.
 _MIN_COS = 1e-4
-MOST_BOUNCES = 5
 #: One array a column of the scatterers; each has a dtype of its own.
 Columns: TypeAlias = dict[str, NDArray[Any]]
 #: Slack of the visibility test of a point target [m].
@@ -47,7 +49,7 @@ def trace(
     seed: int | None = None,
     frame: int = 0,
     rays: int = 300_000,
-    max_bounces: int = 1,
+    max_bounces: int | None = None,
     backend: str = "auto",
 ) -> Scatterers:
     """Cast rays from a radar over a scene.
@@ -67,8 +69,9 @@ def trace(
         Frame index, for the random numbers.
     rays : int
         About how many cells cover the antenna pattern down to -40 dB two-way. Objects with ``aim`` get theirs on top.
-    max_bounces : int
-        Surfaces along a path, 1 to 5. With more than 1, ``paths`` of the result holds the ways over several.
+    max_bounces : int, optional
+        Surfaces along a path, 1 to 5; default: the scene's, which is 1 unless it says otherwise. With more than 1,
+        ``paths`` of the result holds the ways over several.
     backend : str
         ``"auto"``, ``"cuda"``, ``"llvm"`` or ``"scalar"``.
 
@@ -86,8 +89,9 @@ def trace(
     """
     if rays < 100:
         raise InputError(f"rays: at least 100 are needed to cover an antenna pattern, got {rays}")
-    if not 1 <= max_bounces <= MOST_BOUNCES:
-        raise InputError(f"max_bounces: {max_bounces}; allowed: 1 (first surfaces) to {MOST_BOUNCES}")
+    max_bounces = scene.max_bounces if max_bounces is None else max_bounces
+    if not 1 <= max_bounces <= MOST_SCENE_BOUNCES:
+        raise InputError(f"max_bounces: {max_bounces}; allowed: 1 (first surfaces) to {MOST_SCENE_BOUNCES}")
     mount = scene.radar(radar)
     profile = profile or scene.profile_of(mount)
     run_seed = scene.seed if seed is None else seed
@@ -105,13 +109,15 @@ def trace(
         for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
         for block in _all_rows(world, launch.cells, p, h, d.result())
     ]
-    rows.append(_point_rows(scene, world, caster, time + profile.frame_mid_s))
+    points = _point_rows(scene, world, caster, time + profile.frame_mid_s)
+    rows.append(points)
     columns: dict[str, Any] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     bounced = None
     if max_bounces > 1:
         wavenumber = 2.0 * np.pi / profile.wavelength_m
         image = image_launches(world, caster, aimed, run_seed, frame, mount.name)
         bounced = bounced_paths(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
+        bounced = Paths.join([bounced, point_paths(world, caster, points, max_bounces)])
     return Scatterers(
         **columns,
         paths=bounced,
