@@ -6,6 +6,7 @@ The cell is cut along these places, so that a straight edge is followed exactly:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -75,6 +76,11 @@ class Pieces:
     def select(self, rows: slice) -> Pieces:
         """Return some of the pieces."""
         return Pieces(self.ray[rows], self.done[rows], self.outline[rows])
+
+    @classmethod
+    def joined(cls, parts: Sequence[Pieces]) -> Pieces:
+        """Return the pieces of several cuts."""
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("ray", "done", "outline")))
 
     def echoes(
         self, lit: Views, seen: Views, chain: Chain, order: int, fields: Fields, view: IntArray, free: FloatArray

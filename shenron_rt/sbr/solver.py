@@ -26,6 +26,9 @@ __all__ = ["CHUNK", "Settings", "scattered"]
 
 #: Cells worked on at once: bounds memory.
 CHUNK = 1 << 17
+#: Level from which on the cells of a view are only quartered while there are no more of them than this: a corner has
+#: edges that meet at few points, which do not average out, a duct or a car has them everywhere.
+_COARSE, _FEW = 3, 512
 
 
 @dataclass(frozen=True)
@@ -158,10 +161,24 @@ class _Sum:
         chain = trace_chain(surface, self.lit, rays, most, monostatic)
         shortest = SPEED_OF_LIGHT / float(self.frequency_hz.max())
         found, pending = self._sort(chain, cells, corner, shortest)
-        rim = Rim(surface, self.lit, chain, most, monostatic, self.lattice, cells.select(pending), corner[pending])
-        pieces, left = rim.cut(shortest, cells.level == self.settings.levels)
-        self._echoes(chain, corner, found, pieces)
-        return rim.cells.select(left).quartered()
+        last = self._is_last(cells, pending)
+        cut, left = [], cells.select(pending[:0])
+        for rows, all_of_them in ((pending[~last], False), (pending[last], True)):
+            rim = Rim(surface, self.lit, chain, most, monostatic, self.lattice, cells.select(rows), corner[rows])
+            pieces, uncut = rim.cut(shortest, all_of_them)
+            cut.append(pieces)
+            left = left if all_of_them else rim.cells.select(uncut)
+        self._echoes(chain, corner, found, Pieces.joined(cut))
+        return left.quartered()
+
+    def _is_last(self, cells: Cells, pending: IntArray) -> BoolArray:
+        """Return which pending cells are not to be quartered: at the finest level, or where a view has many of them."""
+        if cells.level == self.settings.levels:
+            return np.ones(len(pending), dtype=bool)
+        if cells.level < _COARSE:
+            return np.zeros(len(pending), dtype=bool)
+        view = cells.view[pending]
+        return np.asarray(np.bincount(view, minlength=1)[view] > _FEW)
 
     def _sort(self, chain: Chain, cells: Cells, corner: IntArray, wavelength: float) -> tuple[list[IntArray], IntArray]:
         """Return the cells that are tubes at each bounce, and those that need a closer look.
