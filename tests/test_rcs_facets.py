@@ -11,7 +11,7 @@ import shenron_rt as srt
 from shenron_rt.frames import Pose
 from shenron_rt.sbr import sight
 from shenron_rt.sbr.sight import HIDDEN, LIMB, PARTLY, WHOLE, Sight
-from shenron_rt.sbr.subdivide import clipped, subdivided
+from shenron_rt.sbr.subdivide import clipped, shortened
 from shenron_rt.sbr.surface import Reflector, Surface
 from shenron_rt.sbr.views import Views
 from shenron_rt.scene.mesh import TaggedMesh, concatenate
@@ -64,14 +64,23 @@ def test_a_body_turned_inside_out_is_still_convex() -> None:
 
 
 def test_parts_of_triangles_add_up_to_them(rng: np.random.Generator) -> None:
-    triangles = rng.normal(size=(20, 3, 3))
-    count = rng.integers(1, 6, 20)
-    parts, row = subdivided(triangles, count)
-    assert np.array_equal(np.bincount(row), count**2)
-    np.testing.assert_allclose(area(parts), (area(triangles) / count**2)[row], rtol=1e-9)  # rounding of the corners
+    triangles, longest = rng.normal(size=(20, 3, 3)), 0.4
+    cut = shortened(triangles, lambda place: np.full(len(place), longest), 100_000)
+    assert cut is not None
+    parts, row = cut
     np.testing.assert_allclose(np.bincount(row, area(parts)), area(triangles), rtol=1e-9)
+    sides = np.linalg.norm(np.roll(parts, -1, axis=1) - parts, axis=2)
+    assert sides.max() <= longest
     turn = np.einsum("ni,ni->n", *(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (parts, triangles[row])))
     assert (turn > 0).all()
+    assert shortened(triangles, lambda place: np.full(len(place), longest), len(parts) - 1) is None
+
+
+def test_a_thin_triangle_is_cut_along_its_length_only() -> None:
+    thin = np.array([[[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [0.0, 0.01, 0.0]]])
+    cut = shortened(thin, lambda place: np.full(len(place), 0.02), 10_000)
+    assert cut is not None
+    assert len(cut[1]) < 4 * 6.0 / 0.02  # not that squared
 
 
 def test_what_is_cut_off_and_what_is_left_add_up(rng: np.random.Generator) -> None:

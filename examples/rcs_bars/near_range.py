@@ -89,9 +89,9 @@ def beam_surface(y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def beam_mesh(ghz: float) -> TaggedMesh:
-    """Return the beam cut so finely that the sagitta of its facets is lambda/600."""
+    """Return the beam cut so finely that the sagitta of its facets is lambda/2400."""
     sharpest = 1.0 / (DEPTH * (2.0 * math.pi / PERIOD) ** 2)
-    n = math.ceil(HEIGHT / math.sqrt(8.0 * sharpest * wavelength(ghz) / 600.0))
+    n = math.ceil(HEIGHT / math.sqrt(8.0 * sharpest * wavelength(ghz) / 2400.0))
     z = np.linspace(-0.5 * HEIGHT, 0.5 * HEIGHT, n + 1)
     y = np.array([-0.5 * LENGTH, 0.5 * LENGTH])
     points, _ = beam_surface(*np.meshgrid(y, z, indexing="ij"))

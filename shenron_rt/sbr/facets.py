@@ -57,12 +57,12 @@ def facet_echoes(
     seen = lit if receivers is None else receivers
     done = np.zeros((len(seen), int(surface.group.max()) + 1), dtype=bool)
     sight = Sight(surface, step)
-    if not sight.possible:
+    parts = facet_parts(surface, [lit, seen], SPEED_OF_LIGHT / float(frequency_hz.max())) if sight.possible else None
+    if parts is None:
         return done
     facets = _Facets(surface, lit, seen, receivers is None, frequency_hz, total)
-    parts = facet_parts(surface, [lit, seen], SPEED_OF_LIGHT / float(frequency_hz.max()))
     source = None if receivers is None else sight.of(lit)[0]
-    for rows, state in sight.blocks(seen, _AT_ONCE):
+    for rows, state in sight.blocks(seen, _AT_ONCE, len(parts.face)):
         if source is not None:  # the lesser of what both see
             state = np.where((state == HIDDEN) | (source == HIDDEN), HIDDEN, np.maximum(state, source))
         clear = np.ones((len(state), done.shape[1]), dtype=bool)
@@ -139,17 +139,38 @@ class _Facets:
         receive = receive_basis(self.seen, view, toward)
         strength = radiated(fields.arriving[rows], leaving, direction, normal, normal, toward, receive)
         along, across, outline = parts.along[part], parts.across[part], parts.outline[part]
-        slope = direction - toward
-        gradient = k * np.stack([dot(slope, along), dot(slope, across)], axis=1)
-        way = path + back
-        for views, leg, length in ((self.lit, direction, path), (self.seen, toward, back)):
-            if views.distance is not None:
-                # mean of how much longer a spherical leg is than its tangent: (|x|^2 - (x . leg)^2) / (2 R), and the
-                # mean square of a coordinate over a triangle is 1/12 of the sum over its corners, from the centroid
-                ahead = outline[:, :, 0] * dot(along, leg)[:, None] + outline[:, :, 1] * dot(across, leg)[:, None]
-                way += ((outline**2).sum(axis=(1, 2)) - (ahead**2).sum(axis=1)) / (24.0 * (length + views.distance))
-        phasor = polygon_integral(outline, gradient) * np.exp(-1j * k * way)
+        if self.lit.distance is None and self.seen.distance is None:
+            slope = direction - toward
+            gradient = np.stack([dot(slope, along), dot(slope, across)], axis=1)
+            phasor = polygon_integral(outline, k * gradient) * np.exp(-1j * k * (path + back))
+        else:
+            phasor = self._of_spherical(parts, part, self._source(view), view, k)
         phasor *= decay * self.lit.decay(path)
         if not self.surface.outward:  # the other side of an open surface is dark
             phasor *= dot(normal, toward) > 0.0
         return by_view(strength, phasor, view, len(self.seen))
+
+    def _of_spherical(self, parts: Parts, part: IntArray, source: IntArray, view: IntArray, k: float) -> ComplexArray:
+        """Return (n,) integrals of exp(-jk path) over parts of spherical waves.
+
+        The path is exact at the corners and linear between them, so that neighbours agree along their edges. Inside it
+        lies lower; that is taken off where the phase stands still, and not where it turns and only edges count.
+        """
+        corners, outline = parts.corners[part, :, :3], parts.outline[part]
+        way, bulge = np.zeros((len(part), 3)), np.zeros(len(part))
+        for views, row in ((self.lit, source), (self.seen, view)):
+            for number in range(3):
+                toward, length, _ = views.seen_from(corners[:, number], row)
+                way[:, number] += length
+                if views.distance is not None:
+                    # (|x|^2 - (x . leg)^2) / (2 R) at x from the centroid: a third of the sum over the corners is the
+                    # mean of what they have, a twelfth that of the whole triangle
+                    x = outline[:, number]
+                    ahead = x[:, 0] * dot(parts.along[part], toward) + x[:, 1] * dot(parts.across[part], toward)
+                    bulge += ((x**2).sum(axis=1) - ahead**2) / (8.0 * (length + views.distance))
+        moment = np.einsum("nki,nkj->nij", outline, outline)
+        gradient = np.linalg.solve(moment, np.einsum("nki,nk->ni", outline, way)[:, :, None])[:, :, 0]
+        lobe = polygon_integral(outline, k * gradient)
+        area = polygon_integral(outline, np.zeros_like(gradient)).real
+        still = np.abs(lobe) / np.maximum(area, 1e-300)
+        return np.asarray(lobe * np.exp(-1j * k * (way.mean(axis=1) - still * bulge)))

@@ -9,14 +9,18 @@ import numpy as np
 
 from .._typing import FloatArray, IntArray
 from .sight import heights
-from .subdivide import clipped, subdivided
+from .subdivide import clipped, shortened
 from .surface import Surface
 from .views import Views
 
 __all__ = ["Parts", "facet_parts"]
 
 #: How far the path to a corner of a part of a facet may deviate from linear, in wavelengths; its mean is taken out.
-_STRAIGHT = 1.0 / 32.0
+_STRAIGHT = 1.0 / 256.0
+#: How near the nearest point of a part is taken to be to a radar at least, in distances of its middle.
+_NEAREST = 0.05
+#: Parts of all facets: more are slower than cells, and take gigabytes.
+_MOST = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +76,8 @@ class Parts:
         return Parts(self.surface, self.face[rows[row]], above), row
 
 
-def facet_parts(surface: Surface, legs: list[Views], wavelength: float) -> Parts:
-    """Return all facets, cut smaller where waves are spherical.
+def facet_parts(surface: Surface, legs: list[Views], wavelength: float) -> Parts | None:
+    """Return all facets, cut smaller where waves are spherical; None where that takes too many parts.
 
     Parameters
     ----------
@@ -84,14 +88,22 @@ def facet_parts(surface: Surface, legs: list[Views], wavelength: float) -> Parts
         The shortest [m].
     """
     triangles = surface.mesh.vertices[surface.mesh.faces]
-    count = np.ones(len(triangles), dtype=np.int64)
-    distances = [leg.distance for leg in legs if leg.distance is not None]
-    if distances:
-        size = np.linalg.norm(triangles - triangles.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-        nearest = min(distances) - float(np.linalg.norm(surface.centre)) - surface.radius
-        nearest = max(nearest, 0.05 * min(distances))
-        # each leg bends by size^2 / (2 R)
-        count = np.maximum(np.ceil(size / np.sqrt(_STRAIGHT * wavelength * nearest)), 1.0).astype(np.int64)
     normal = surface.corner_normal if surface.outward else np.zeros_like(triangles)
-    pieces, face = subdivided(np.concatenate([triangles, normal], axis=2), count)
-    return Parts(surface, face, pieces)
+    corners = np.concatenate([triangles, normal], axis=2)
+    radars = [leg.distance * leg.toward for leg in legs if leg.distance is not None]
+    if not radars:
+        return Parts(surface, np.arange(len(triangles)), corners)
+    from scipy.spatial import cKDTree
+
+    places = cKDTree(np.concatenate(radars))
+
+    def longest(place: FloatArray) -> FloatArray:
+        middle = place.mean(axis=1)
+        size = np.linalg.norm(place - middle[:, None, :], axis=2).max(axis=1)
+        away = places.query(middle)[0]
+        nearest = np.maximum(away - size, _NEAREST * away)
+        # each leg bends by x^2 / (2 R) at x from the centroid, which no corner is farther from than 2/3 of a side
+        return np.asarray(1.5 * np.sqrt(_STRAIGHT * wavelength * nearest))
+
+    cut = shortened(corners, longest, _MOST)
+    return None if cut is None else Parts(surface, cut[1], cut[0])

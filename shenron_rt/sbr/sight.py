@@ -11,7 +11,7 @@ import numpy as np
 
 from .._typing import FloatArray, IntArray, NDArray
 from .chain import dot, sees
-from .subdivide import subdivided
+from .subdivide import shortened
 from .surface import Surface
 from .views import Views
 
@@ -24,6 +24,8 @@ HIDDEN, WHOLE, LIMB, PARTLY = 0, 1, 2, 3
 _MOST_FACES, _MOST_RAYS = 5000, 4.0
 #: Rays a view that are always worth it.
 _FEW_RAYS = 4096
+#: Longest side of the parts of a facet that are looked at, in what must be noticed: their middles are closer.
+_SIDE = 2.0
 #: How far from the middle of a facet towards its corners it is looked at.
 _INSET = 0.95
 
@@ -45,16 +47,18 @@ class Sight:
         """Whether it can tell."""
         if not surface.convex and surface.mesh.n_faces <= _MOST_FACES:
             triangles = surface.mesh.vertices[surface.mesh.faces]
-            edge = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
-            split = np.ceil(edge / step).astype(np.int64)
-            most = max(_MOST_RAYS * (2.0 * surface.radius / step) ** 2, _FEW_RAYS)
-            if (split.astype(np.float64) ** 2).sum() + 3 * len(split) <= most:
+            most = int(max(_MOST_RAYS * (2.0 * surface.radius / step) ** 2, _FEW_RAYS))
+            cut = shortened(triangles, lambda place: np.full(len(place), _SIDE * step), most)
+            if cut is not None:
                 self.possible = True
-                self._points, self._face = _places(triangles, np.maximum(split, 1))
+                self._points, self._face = _places(triangles, *cut)
 
-    def blocks(self, views: Views, most: int) -> Iterator[tuple[slice, NDArray[np.int8]]]:
-        """Yield some views after the other, and (b, f) what they see of every facet; ``most`` bounds b f."""
-        size = max(1, most // max(3 * self._surface.mesh.n_faces, len(self._face)))
+    def blocks(self, views: Views, most: int, parts: int) -> Iterator[tuple[slice, NDArray[np.int8]]]:
+        """Yield some views after the other, and (b, f) what they see of every facet.
+
+        ``most`` bounds b times the facets, rays and parts of facets.
+        """
+        size = max(1, most // max(3 * self._surface.mesh.n_faces, len(self._face), parts))
         for start in range(0, len(views), size):
             rows = slice(start, min(start + size, len(views)))
             yield rows, self.of(views.select(rows))
@@ -102,9 +106,8 @@ def heights(views: Views, view: IntArray, points: FloatArray, normal: FloatArray
     return np.asarray(height)
 
 
-def _places(triangles: FloatArray, split: IntArray) -> tuple[FloatArray, IntArray]:
+def _places(triangles: FloatArray, parts: FloatArray, face: IntArray) -> tuple[FloatArray, IntArray]:
     """Return points on triangles and the row of each, sorted by it: middles of their parts, and near their corners."""
-    parts, face = subdivided(triangles, split)
     middle = triangles.mean(axis=1, keepdims=True)
     corners = middle + _INSET * (triangles - middle)
     points = np.concatenate([parts.mean(axis=1), corners.reshape(-1, 3)])

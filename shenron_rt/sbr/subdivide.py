@@ -1,52 +1,80 @@
-"""Triangles cut into equal smaller ones."""
+"""Triangles cut into smaller ones."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from .._typing import FloatArray, IntArray
 
-__all__ = ["subdivided"]
+__all__ = ["clipped", "shortened"]
+
+#: Shortest side of a needle, in what sides may measure.
+_THIN = 0.6
 
 
-def subdivided(triangles: FloatArray, parts: IntArray) -> tuple[FloatArray, IntArray]:
-    """Cut every side of some triangles into equal parts and return the triangles between.
+def shortened(
+    triangles: FloatArray, longest: Callable[[FloatArray], FloatArray], most: int
+) -> tuple[FloatArray, IntArray] | None:
+    """Cut triangles until their sides are short enough: halves of wide ones, slices of needles.
 
     Parameters
     ----------
     triangles : (n, 3, d) float
-        Anything that is linear over a triangle: places, normals.
-    parts : (n,) int
-        Parts a side, at least 1; a triangle becomes that number squared.
+        Corners, and anything else that is linear over a triangle after the first three columns.
+    longest : callable
+        (m, 3, 3) corners to (m,) the most that a side may measure [m].
+    most : int
+        Triangles to end with.
 
     Returns
     -------
     smaller : (m, 3, d) float
         Wound as the given ones.
     row : (m,) int
-        The triangle that each is part of.
+        The triangle that each is part of. None where there would be too many.
     """
-    pieces, rows = [], []
-    for count in np.unique(parts).tolist():
-        row = np.flatnonzero(parts == count)
-        a = triangles[row, 0]
-        u, v = (triangles[row, 1] - a) / count, (triangles[row, 2] - a) / count
-        corner = _grid(count)
-        cut = a[:, None, None] + corner[None, :, :, :1] * u[:, None, None] + corner[None, :, :, 1:] * v[:, None, None]
-        pieces.append(cut.reshape(-1, 3, triangles.shape[2]))
-        rows.append(np.repeat(row, len(corner)))
-    if not pieces:
-        return triangles, np.zeros(0, dtype=np.int64)
+    row, count = np.arange(len(triangles)), 0
+    done: list[tuple[FloatArray, IntArray]] = []
+    while len(triangles):
+        place = triangles[:, :, :3]
+        side = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2)
+        limit = longest(place)
+        long = side.max(axis=1) > limit
+        needle = long & (side.min(axis=1) <= _THIN * limit)
+        wide = long & ~needle
+        slices = np.ceil(side[needle].max(axis=1) / (np.sqrt(1.0 - _THIN**2) * limit[needle])).astype(np.int64)
+        count += int((~long).sum()) + int((2 * slices - 1).sum())
+        if count + 2 * int(wide.sum()) > most:
+            return None
+        done.append((triangles[~long], row[~long]))
+        cut, of = _sliced(_from_side(triangles[needle], side[needle].argmin(axis=1)), slices)
+        done.append((cut, row[needle][of]))
+        a, b, c = np.moveaxis(_from_side(triangles[wide], side[wide].argmax(axis=1)), 1, 0)
+        middle = 0.5 * (a + b)
+        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        row = np.tile(row[wide], 2)
+    pieces, rows = zip(*done, strict=True)
     return np.concatenate(pieces), np.concatenate(rows)
 
 
-def _grid(count: int) -> FloatArray:
-    """Return (count^2, 3, 2) steps along both sides to the corners of the parts."""
-    i, j = (a.ravel() for a in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
-    at = np.stack([i, j], axis=1).astype(np.float64)
-    upright = at[i + j < count][:, None, :] + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    turned = at[i + j < count - 1][:, None, :] + np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    return np.concatenate([upright, turned])
+def _from_side(triangles: FloatArray, first: IntArray) -> FloatArray:
+    """Return triangles with their corners turned so that a side is the first."""
+    turn = (first[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, turn[:, :, None], axis=1)
+
+
+def _sliced(triangles: FloatArray, count: IntArray) -> tuple[FloatArray, IntArray]:
+    """Cut triangles across, along their first sides, into so many slices; all but the one at the tip become two."""
+    row = np.repeat(np.arange(len(triangles)), count)
+    step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    base, other, tip = np.moveaxis(triangles[row], 1, 0)
+    near, far = ((step + k)[:, None] / count[row][:, None] for k in (0, 1))
+    a, b, c, d = (tip + share * (end - tip) for share, end in ((near, base), (far, base), (far, other), (near, other)))
+    square = step > 0
+    pieces = np.concatenate([np.stack([b, c, a], axis=1), np.stack([a, c, d], axis=1)[square]])
+    return pieces, np.concatenate([row, row[square]])
 
 
 def clipped(triangles: FloatArray, height: FloatArray) -> tuple[FloatArray, IntArray]:
