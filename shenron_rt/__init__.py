@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .pipeline import simulate_all as simulate_all
     from .rcs import RcsSweep as RcsSweep
     from .rcs import sweep_rcs as sweep_rcs
+    from .report import write_report as write_report
     from .returns import Returns as Returns
     from .returns import illuminate as illuminate
     from .scatterers import Scatterers as Scatterers
@@ -90,6 +91,7 @@ _HOME = {
     "sweep_rcs": "rcs",
     "synthesize": "synthesis",
     "trace": "tracing",
+    "write_report": "report",
 }
 
 __all__ = [*sorted(_HOME), "__version__"]

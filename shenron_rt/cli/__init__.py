@@ -22,6 +22,7 @@ _VERBS = {
     "explain": ("explain:explain", "Tell for every object and frame of a run whether it is seen, and why not."),
     "track": ("track:track", "Gather a run's detections to objects, track them, and compare with the truth."),
     "export": ("export:export", "Export a run: MCAP for Foxglove, ROS 2 bag, PCD, PLY, CSV, Zarr."),
+    "report": ("report_page:report", "Write one HTML page about a run: scene, maps, points, objects, settings."),
     "resolve": ("resolve:resolve", "Show which tag every part of a mesh gets, by which rule."),
     "validate": ("validate:validate", "Check YAML, mesh and ADC files and run folders."),
     "profiles": ("tables:profiles", "List the radar profiles, or show one with its derived numbers and sources."),
