@@ -15,7 +15,7 @@ from typing import Any, Self
 _FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-dev-shm-usage", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
-    "--hide-scrollbars", "--remote-debugging-pipe",
+    "--hide-scrollbars", "--enable-unsafe-swiftshader", "--remote-debugging-pipe",
 )  # fmt: skip
 _PATIENCE_S = 60.0
 
@@ -96,9 +96,9 @@ class Browser:
         if method == "Runtime.exceptionThrown":
             detail = params["exceptionDetails"]
             self.errors.append(str(detail.get("exception", {}).get("description") or detail["text"]))
-        elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
+        elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert"):
             self.errors.append(" ".join(str(a.get("value", a.get("description"))) for a in params["args"]))
-        elif method == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+        elif method == "Log.entryAdded" and params["entry"]["level"] == "error":
             self.errors.append(params["entry"]["text"])
         if method:
             self._events.append(message)

@@ -57,7 +57,7 @@ function projected(m, w, h, x, y, z) {
   return [(0.5 + (0.5 * cx) / cw) * w, (0.5 - (0.5 * cy) / cw) * h];
 }
 
-// Show what the radar sees: its range, and as far to the sides as detections lie.
+// Show what the radar sees: its range, and as far to the sides as clear detections and objects lie.
 function fitCamera(w, h) {
   const radar = radarNow();
   const table = array(`${radar.prefix}.detections`);
@@ -68,6 +68,13 @@ function fitCamera(w, h) {
     far = Math.max(far, table.data[DETECTION.x * n + i]);
     wide = Math.max(wide, Math.abs(table.data[DETECTION.y * n + i]));
   }
+  radar.objects.forEach((object, i) => {
+    if (!(object.id > 0)) return;
+    radar.frames.forEach((_, k) => {
+      const x = truthValue(radar, i, "x_m", k), y = truthValue(radar, i, "y_m", k);
+      if (Number.isFinite(x) && Math.hypot(x, y) < radar.profile.max_range_m) [far, wide] = [Math.max(far, x), Math.max(wide, Math.abs(y))];
+    });
+  });
   far = Math.min(far * 1.08, radar.profile.max_range_m);
   const scaleUp = Math.min((h - 56) / (far * 1.06), (w - 60) / (2 * Math.max(wide, far * 0.18)));
   Object.assign(camera.top, { scale: scaleUp, x: (h / 2 - 44) / scaleUp - far * 0.04, y: 0 });

@@ -112,7 +112,7 @@ function colourBar(ctx, box, low, high, label, colour) {
     const y = box.y + box.h - ((v - low) / (high - low)) * box.h;
     ctx.fillText(fixed(v, marks.digits), box.x + box.w + 4, y);
   }
-  rotated(ctx, label, box.x + box.w + 40, box.y + box.h / 2);
+  rotated(ctx, label, box.x + box.w + 44, box.y + box.h / 2);
   ctx.restore();
 }
 
@@ -128,15 +128,14 @@ function haloText(ctx, text, x, y, colour, halo) {
   ctx.restore();
 }
 
-// Names beside points, moved up where another already stands; one list a picture.
+// Names beside points: right, left or higher up, where no other one stands yet; one labeller a picture.
 function labeller(ctx, right, colour, halo) {
   const taken = [];
   return (text, x, y) => {
     const width = ctx.measureText(text).width;
-    const left = x + 9 + width > right;
-    const x0 = left ? x - 9 - width : x + 9;
-    let y0 = y - 5;
-    while (taken.some((t) => Math.abs(t.y - y0) < 13 && x0 < t.x1 + 4 && x0 + width > t.x0 - 4)) y0 -= 13;
+    const free = (x0, y0) => x0 >= 2 && x0 + width <= right && !taken.some((t) => Math.abs(t.y - y0) < 13 && x0 < t.x1 + 4 && x0 + width > t.x0 - 4);
+    const places = [0, -13, 13, -26, 26, -39].flatMap((dy) => [[x + 9, y - 4 + dy], [x - 9 - width, y - 4 + dy]]);
+    const [x0, y0] = places.find(([px, py]) => free(px, py)) || places[0];
     taken.push({ x0, x1: x0 + width, y: y0 });
     ctx.textAlign = "left";
     ctx.textBaseline = "middle";

@@ -13,9 +13,9 @@ function signedColour(share) {
   return css(divergingLut, 127 + Math.round(127 * Math.min(1, Math.max(-1, share))));
 }
 
-// Okabe and Ito's colours, which stay apart for most eyes, and three more.
+// After Okabe and Ito, whose colours stay apart for most eyes; the dark blue and the yellow moved to be seen on both schemes.
 const OBJECT_COLOURS = [
-  "#e69f00", "#56b4e9", "#009e73", "#d55e00", "#cc79a7", "#0072b2", "#f0e442", "#9467bd", "#8c564b", "#17becf",
+  "#e69f00", "#56b4e9", "#12a37f", "#d55e00", "#cc79a7", "#4a78d6", "#c9b400", "#9467bd", "#a5694f", "#17becf",
 ];
 const REST_COLOUR = "#8b98a6";
 

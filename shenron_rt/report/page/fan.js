@@ -72,7 +72,7 @@ painters.push((what) => {
     return;
   }
   const { side, reach } = fanAxes(radar);
-  const room = { w: width - 44 - 62, h: height - 16 - 38 };
+  const room = { w: width - 44 - 76, h: height - 16 - 38 };
   const pixel = Math.min(room.w / (2 * side * reach), room.h / reach);
   const box = { w: 2 * side * reach * pixel, h: reach * pixel };
   box.x = 44 + (room.w - box.w) / 2;
@@ -86,7 +86,7 @@ painters.push((what) => {
   mapMarks(ctx, radar, (d) => polar(d.range, d.azimuth), (t) => polar(t.range_m, (t.azimuth_deg * Math.PI) / 180), box.x + box.w);
   axes(ctx, box, xs, ys, { x: "left  ←  y [m]  →  right", y: "x forward [m]" });
   const [low, high] = mapWindow(radar.maps.ra);
-  const bar = { x: width - 50, y: box.y, w: 10, h: box.h };
+  const bar = { x: width - 64, y: box.y, w: 10, h: box.h };
   colourBar(ctx, bar, low, high, "beamformed [dBm]", levelColour);
   noiseMark(ctx, bar, low, high, radar.maps.ra.noise_dbm);
   fanPlot = { box, xs, ys, polar, reach };

@@ -1,5 +1,6 @@
 // The range-Doppler map: range rate to the right, range up.
 const MAP_RING = "#ffffff";
+const BELOW_NOISE_DB = 5;
 const PICKED = "#ff9d2e";
 
 // Codes of a map of a frame as {codes, rows, columns}, or null.
@@ -9,8 +10,10 @@ function mapOf(radar, short, frame) {
 }
 
 // Level of code 0 shown, and of the top [dBm].
+// What lies well below the noise gets no colours of its own, unless all is asked for.
 function mapWindow(map) {
-  return [state.span ? Math.max(map.low_dbm, map.top_dbm - state.span) : map.low_dbm, map.top_dbm];
+  const low = Math.max(map.low_dbm, map.top_dbm - state.span, Math.min(map.noise_dbm - BELOW_NOISE_DB, map.top_dbm - 20));
+  return [state.span ? low : map.low_dbm, map.top_dbm];
 }
 
 // Colours of the 256 codes of a map as 32-bit pixels.
@@ -78,7 +81,7 @@ painters.push((what) => {
     rdPlot = null;
     return;
   }
-  const box = { x: 48, y: 6, w: width - 48 - 62, h: height - 6 - 38 };
+  const box = { x: 48, y: 6, w: width - 48 - 76, h: height - 6 - 38 };
   const at = rdAxes(radar);
   const xs = scale(at.velocity.begin, at.velocity.end, box.x, box.x + box.w);
   const most = Math.min(at.range.end, (radar.maps.n_range - 0.5) * radar.maps.range_step_m);

@@ -39,9 +39,11 @@ function start() {
   byId("theme").addEventListener("click", () => applyScheme({ auto: darkNow() ? "light" : "dark", light: "dark", dark: "light" }[scheme]));
   systemDark.addEventListener("change", () => applyScheme(scheme));
   painters.push((what) => {
-    if (!changedAny(what, "radar", "view", "colour")) return;
+    if (!changedAny(what, "radar", "view", "colour", "trail", "span", "echoes", "tracks")) return;
     choice.value = String(state.radar);
-    byId("colour").value = state.colour;
+    for (const id of ["colour", "trail", "span"]) byId(id).value = String(state[id]);
+    byId("show-echoes").checked = state.echoes;
+    byId("show-tracks").checked = state.tracks;
     for (const view of VIEWS) byId(`view-${view}`).setAttribute("aria-pressed", String(state.view === view));
   });
   Object.assign(state, fromAddress());

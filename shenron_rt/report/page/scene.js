@@ -121,6 +121,12 @@ function sceneDetections(ctx, radar, at) {
   for (const d of detectionsOf(radar, state.frame).reverse()) {
     const p = at(d.x, d.y, d.z);
     if (!p) continue;
+    const foot = state.view === "orbit" && at(d.x, d.y, -radar.mount.xyz_m[2]);
+    if (foot) {
+      ctx.strokeStyle = rounded(c.muted, 0.6);
+      ctx.lineWidth = 0.8;
+      line(ctx, p[0], p[1], foot[0], foot[1]);
+    }
     const radius = Math.min(7.5, Math.max(3, 2 + d.snr_db / 8));
     ctx.beginPath();
     ctx.arc(p[0], p[1], radius, 0, 2 * Math.PI);

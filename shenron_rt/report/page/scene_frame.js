@@ -13,7 +13,7 @@ function sceneAxes(ctx, w, h) {
   ctx.textBaseline = "top";
   const across = ticks(ys.high, ys.low, w / 80), along = ticks(xs.low, xs.high, h / 60);
   for (const v of across) {
-    if (ys(v) < 44) continue;
+    if (ys(v) < 44 || ys(v) > w - 14) continue;
     line(ctx, ys(v), h - 32, ys(v), h - 28);
     ctx.fillText(fixed(v, across.digits), ys(v), h - 27);
   }
@@ -51,9 +51,9 @@ function sceneLegend(ctx, radar, w, h) {
     const rule = COLOURINGS[state.colour];
     const [low, high] = colourLimits(radar, state.colour);
     ctx.fillStyle = rounded(c.stage, 0.8);
-    ctx.fillRect(w - 72, 4, 68, 178);
+    ctx.fillRect(w - 78, 4, 74, 178);
     const colour = rule.signed ? (share) => signedColour(2 * share - 1) : levelColour;
-    colourBar(ctx, { x: w - 64, y: 14, w: 10, h: 158 }, low, high, rule.label, colour);
+    colourBar(ctx, { x: w - 70, y: 14, w: 10, h: 158 }, low, high, rule.label, colour);
   }
   ctx.fillStyle = c.muted;
   ctx.textAlign = "left";
