@@ -105,10 +105,12 @@ class Browser:
 
     def open(self, page: Path, fragment: str = "") -> None:
         """Load a file and wait until it has painted."""
+        self.send("Page.navigate", url="about:blank")  # else another fragment would not load it anew
         self._events.clear()
         self.send("Page.navigate", url=page.absolute().as_uri() + fragment)
         until = time.monotonic() + _PATIENCE_S
-        while not self.evaluate("Boolean(window.report && window.report.stats.redraws)"):
+        ready = "document.readyState === 'complete' && window.report && window.report.stats.redraws > 1"
+        while not self.evaluate(f"Boolean({ready})"):
             if time.monotonic() > until or self.errors:
                 raise RuntimeError(f"the page did not start: {self.errors}")
             time.sleep(0.05)

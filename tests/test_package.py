@@ -49,7 +49,9 @@ def test_wheel_holds_all_code_and_data_and_nothing_else(wheel: Path) -> None:
     }
     held = {n for n in _names(wheel) if ".dist-info/" not in n}
     assert len(data) >= 15  # eight profiles, six scenes, a material table
-    assert held == code | data | {"shenron_rt/py.typed"}
+    page = {p.relative_to(ROOT).as_posix() for p in (ROOT / "shenron_rt/report/page").iterdir()}
+    assert len(page) >= 3  # the page of a report, its style, its scripts
+    assert held == code | data | page | {"shenron_rt/py.typed"}
 
 
 def test_wheel_has_licence_and_entry_point(wheel: Path) -> None:

@@ -18,12 +18,13 @@ _TYPES = {"u1": np.uint8, "i2": np.int16, "i4": np.int32, "u4": np.uint32, "f4":
 
 
 class Arrays:
-    """Named arrays of a page, in the order they were added."""
+    """Named arrays of a page: those it begins with, and those that may come after it is shown."""
 
     def __init__(self) -> None:
-        self._elements: dict[str, str] = {}
+        self._first: list[str] = []
+        self._later: list[str] = []
 
-    def add(self, name: str, values: ArrayLike, kind: str) -> None:
+    def add(self, name: str, values: ArrayLike, kind: str, *, later: bool = False) -> None:
         """Add an array.
 
         Parameters
@@ -34,21 +35,24 @@ class Arrays:
             Any shape.
         kind : str
             ``u1``, ``i2``, ``i4``, ``u4``, ``f4`` or ``f8``: what it is stored as.
+        later : bool
+            The first picture can do without it.
         """
         array = np.ascontiguousarray(values, dtype=np.dtype(_TYPES[kind]).newbyteorder("<"))
         shape = ",".join(str(n) for n in array.shape)
         text = base64.b64encode(array.tobytes()).decode("ascii")
-        self._elements[name] = (
-            f'<script type="text/plain" data-array="{name}" data-kind="{kind}" data-shape="{shape}">{text}</script>'
-        )
+        self._put(f'type="text/plain" id="{name}" data-kind="{kind}" data-shape="{shape}"', text, later)
 
-    def add_json(self, name: str, value: Any) -> None:
+    def add_json(self, name: str, value: Any, *, later: bool = False) -> None:
         """Add plain values."""
-        self._elements[name] = f'<script type="application/json" data-json="{name}">{script_json(value)}</script>'
+        self._put(f'type="application/json" id="{name}"', script_json(value), later)
 
-    def html(self) -> str:
-        """Return the elements, one a line."""
-        return "\n".join(self._elements.values())
+    def _put(self, attributes: str, text: str, later: bool) -> None:
+        (self._later if later else self._first).append(f"<script {attributes}>{text}</script>")
+
+    def html(self, *, later: bool = False) -> str:
+        """Return the elements of either kind, one a line."""
+        return "\n".join(self._later if later else self._first)
 
 
 def script_json(value: Any) -> str:

@@ -118,7 +118,7 @@ def add_explained(
         if source is None:
             continue
         try:
-            arrays.add_json(f"{prefix}.explain.{k}", _compact(source))
+            arrays.add_json(f"{prefix}.explain.{k}", _compact(source), later=k > 0)
             for item in source["objects"]:
                 verdicts.setdefault(int(item["object_id"]), [None] * len(frames))[k] = str(item["verdict"]["name"])
         except (KeyError, TypeError) as error:
@@ -136,7 +136,7 @@ def _compact(frame: Mapping[str, Any]) -> dict[str, Any]:
     objects = {}
     for item in frame["objects"]:
         kept = {name: item.get(name) for name in _ROW}
-        kept |= {name: item["verdict"].get(name) for name in ("text", "numbers", "change")}
+        kept |= {name: item["verdict"].get(name) for name in ("text", "by", "numbers", "change")}
         kept["verdict"] = item["verdict"]["name"]
         shares = item.get("shares") or ()
         kept["shares"] = [[s["name"], s["cell_dbm"], s["threshold_dbm"]] for s in shares]

@@ -93,7 +93,7 @@ def add_maps(
         result[short] = coding | {"pool": pools.pools[short]}
         for k, frame in enumerate(levels):
             if frame:
-                arrays.add(f"{prefix}.{short}.{k}", encoded_levels(frame[short], low, step), "u1")
+                arrays.add(f"{prefix}.{short}.{k}", encoded_levels(frame[short], low, step), "u1", later=k > 0)
     return result
 
 

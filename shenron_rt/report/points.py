@@ -73,8 +73,9 @@ def add_echoes(
     level = np.concatenate([np.zeros(0) if s is None else s[1] for s in sampled])
     top = float(np.ceil(level.max()))
     step = max(float(np.abs(position).max()) / 32767, 1e-3)
-    arrays.add(f"{prefix}.echoes", np.rint(position / step), "i2")
-    arrays.add(f"{prefix}.echo_level", np.clip(np.rint((level - top) / _ECHO_SPAN_DB * 255 + 255), 0, 255), "u1")
+    arrays.add(f"{prefix}.echoes", np.rint(position / step), "i2", later=True)
+    code = np.clip(np.rint((level - top) / _ECHO_SPAN_DB * 255 + 255), 0, 255)
+    arrays.add(f"{prefix}.echo_level", code, "u1", later=True)
     every = max(s[2] for s in sampled if s is not None)
     return {"start": _starts(places), "step_m": step, "top_dbm": top, "span_db": _ECHO_SPAN_DB, "every": every}
 

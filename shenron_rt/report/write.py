@@ -149,5 +149,6 @@ def _filled(title: str, about: Mapping[str, Any], arrays: Arrays) -> str:
         style=text("style.css"),
         about=script_json(about),
         arrays=arrays.html(),
+        later=arrays.html(later=True),
         script="\n".join(text(name) for name in _SCRIPTS),
     )

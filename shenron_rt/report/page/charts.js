@@ -120,6 +120,7 @@ painters.push((what) => {
       ctx.fill();
     }
     ctx.restore();
+    if (!values.length) nothing(ctx, 2 * box.x + box.w, 2 * box.y + box.h, "no detection of it");
     chartPlot.push({ box, xs });
   });
 });

@@ -1,9 +1,7 @@
 // Data of the page and its one state. Arrays are decoded when they are first asked for; a few hundred are kept.
-const about = JSON.parse(document.getElementById("about").textContent);
-const stored = new Map();
-for (const element of document.querySelectorAll("script[data-array], script[data-json]")) {
-  stored.set(element.dataset.array || element.dataset.json, element);
-}
+// Most of them stand after this script, so that the page shows before it is read to its end.
+const byId = (id) => document.getElementById(id);
+const about = JSON.parse(byId("about").textContent);
 const TYPES = {
   u1: Uint8Array, i2: Int16Array, i4: Int32Array, u4: Uint32Array, f4: Float32Array, f8: Float64Array,
 };
@@ -22,7 +20,7 @@ function bytesOf(text) {
 function array(name) {
   const known = decodedArrays.get(name);
   if (known) return known;
-  const element = stored.get(name);
+  const element = byId(name);
   if (!element) return null;
   const bytes = bytesOf(element.textContent);
   const data = new TYPES[element.dataset.kind](bytes.buffer, bytes.byteOffset, bytes.length / TYPES[element.dataset.kind].BYTES_PER_ELEMENT);
@@ -34,11 +32,8 @@ function array(name) {
 
 const parsed = new Map();
 function json(name) {
-  if (!parsed.has(name)) {
-    const element = stored.get(name);
-    parsed.set(name, element ? JSON.parse(element.textContent) : null);
-  }
-  return parsed.get(name);
+  if (!parsed.has(name) && byId(name)) parsed.set(name, JSON.parse(byId(name).textContent));
+  return parsed.get(name) || null;
 }
 
 // ---- state
@@ -76,7 +71,6 @@ function redraw(changed = ["all"]) {
 }
 
 const changedAny = (what, ...keys) => what.has("all") || keys.some((key) => what.has(key));
-const byId = (id) => document.getElementById(id);
 const radarNow = () => about.radars[state.radar];
 const frameNow = () => radarNow().frames[state.frame];
 

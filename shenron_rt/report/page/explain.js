@@ -4,16 +4,12 @@ painters.push((what) => {
   const radar = radarNow();
   const told = explanationOf(radar, state.frame);
   const why = told && told.objects[String(state.object)];
-  const card = byId("card");
-  if (!why) {
-    card.replaceChildren();
-    return;
-  }
-  const title = `${nameOf(radar, state.object)} in frame ${frameNow().frame}: ${why.text}`;
-  card.replaceChildren(
-    el("h3", {}, title),
-    why.change ? el("p", {}, `Would be seen with: ${why.change}`) : "",
-    el("div", { class: "columns" }, waterfallTable(why), el("div", {}, sharesTable(why), numbersTable(why))),
+  byId("why").hidden = !why;
+  if (!why) return;
+  byId("why-title").textContent = `${nameOf(radar, state.object)}, frame ${frameNow().frame}: ${why.text}`;
+  byId("card").replaceChildren(
+    el("p", {}, why.change ? `What would make it visible: ${why.change}.` : ""),
+    el("div", { class: "columns" }, waterfallTable(why), el("div", { class: "side" }, sharesTable(why), numbersTable(why))),
   );
 });
 
@@ -41,6 +37,7 @@ function sharesTable(why) {
 
 function numbersTable(why) {
   const plain = (value) => (typeof value === "number" ? fixed(value) : value && typeof value === "object" ? Object.entries(value).map(([k, v]) => `${k} ${plain(v)}`).join(", ") : String(value));
-  const rows = Object.entries(why.numbers || {}).map(([name, value]) => el("tr", {}, el("td", {}, name.replaceAll("_", " ")), el("td", { class: "n", style: { whiteSpace: "normal" } }, plain(value))));
+  const known = Object.entries(why.numbers || {}).filter(([, value]) => value !== null && plain(value) !== "");
+  const rows = known.map(([name, value]) => el("tr", {}, el("td", {}, name.replaceAll("_", " ")), el("td", { class: "n", style: { whiteSpace: "normal" } }, plain(value))));
   return rows.length ? el("table", {}, head(["proof"], ["value", 1]), el("tbody", {}, ...rows)) : "";
 }

@@ -67,7 +67,7 @@ painters.push((what) => {
   const radar = radarNow();
   const map = radar.maps && mapOf(radar, "ra", state.frame);
   if (!map || map.columns < 2 || map.rows < 2) {
-    nothing(ctx, width, height, map ? "one channel in azimuth: no angle" : "the run has kept no maps of this frame");
+    nothing(ctx, width, height, map ? "one channel in azimuth: no angle" : mapsMissing());
     fanPlot = null;
     return;
   }

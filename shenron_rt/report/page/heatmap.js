@@ -77,7 +77,7 @@ painters.push((what) => {
   const radar = radarNow();
   const map = radar.maps && mapOf(radar, "rd", state.frame);
   if (!map) {
-    nothing(ctx, width, height, "the run has kept no maps of this frame");
+    nothing(ctx, width, height, mapsMissing());
     rdPlot = null;
     return;
   }
@@ -103,6 +103,8 @@ painters.push((what) => {
   noiseMark(ctx, bar, low, high, radar.maps.rd.noise_dbm);
   rdPlot = { box, xs, ys };
 });
+
+const mapsMissing = () => (document.readyState === "loading" ? "reading the page …" : "the run has kept no maps of this frame");
 
 function nothing(ctx, width, height, text) {
   ctx.fillStyle = ink().muted;

@@ -51,8 +51,12 @@ function start() {
   introduce();
   addEventListener("hashchange", () => set(fromAddress()));
   applyScheme("auto");
+  document.addEventListener("DOMContentLoaded", () => redraw()); // by then the arrays after this script are there
 }
 
 start();
-// For the console, and for tests: what the page knows and shows.
-window.report = { about, state, set, stats, array, json, detectionsOf, truthsOf, rdLevel, raLevel };
+// For the console, and for tests: what the page knows and shows, and the pixels where it shows it.
+window.report = {
+  about, state, set, stats, array, json, detectionsOf, truthsOf, rdLevel, raLevel,
+  sceneAt: (x, y, z) => scenePlot.at(x, y, z), fanAt: (range, azimuth) => fanPlot.polar(range, azimuth), rdAt: (velocity, range) => [rdPlot.xs(velocity), rdPlot.ys(range)],
+};

@@ -72,7 +72,7 @@ function sceneRings(ctx, radar, at, w, h) {
 
 function sceneEchoes(ctx, radar, at) {
   const known = radar.echoes;
-  if (!known) return;
+  if (!known || !array(`${radar.prefix}.echo_level`)) return;
   const xyz = array(`${radar.prefix}.echoes`).data, level = array(`${radar.prefix}.echo_level`).data;
   for (let i = known.start[state.frame]; i < known.start[state.frame + 1]; i++) {
     const p = at(xyz[3 * i] * known.step_m, xyz[3 * i + 1] * known.step_m, xyz[3 * i + 2] * known.step_m);

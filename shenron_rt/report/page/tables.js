@@ -35,17 +35,15 @@ painters.push((what) => {
     const why = told && told.objects[String(t.id)];
     const verdict = verdictOf(radar, t.index, state.frame);
     const good = verdict === "detected";
-    const words = why ? why.text : { detected: "detected", missed: "not detected" }[verdict] || "–";
+    const words = why ? [why.verdict, why.by && `by ${why.by}`].filter(Boolean).join(" ") : { detected: "detected", missed: "not detected" }[verdict] || "–";
     return choosable(t.id === state.object, () => set({ object: t.id, pick: -1 }),
-      el("td", {}, dot(objectColour(radar, t.id)), t.name), el("td", {}, t.tag || "–"),
+      el("td", { class: "name" }, dot(objectColour(radar, t.id)), t.name), el("td", {}, t.tag || "–"),
       number(t.range_m), number(t.azimuth_deg, 1), number(t.velocity_mps), number(t.power_dbm, 1), number(t.snr_db, 1),
-      el("td", { class: good ? "yes" : verdict ? "no" : null }, words),
-      radar.explained ? el("td", {}, (why && why.change) || "") : null);
+      el("td", { class: good ? "yes" : verdict ? "no" : null }, words));
   });
   const columns = [["object"], ["tag"], ["range [m]", 1], ["azimuth [°]", 1], ["range rate [m/s]", 1], ["power [dBm]", 1], ["SNR [dB]", 1], [radar.explained ? "verdict" : "seen"]];
-  if (radar.explained) columns.push(["would be seen with"]);
   fill("objects", head(...columns), rows, "The run knows of no objects.");
-  byId("objects-note").textContent = `truth at mid-frame; SNR of the whole power on the centre of its cells`;
+  byId("objects-note").textContent = "truth at mid-frame; SNR as if its whole power fell on the centre of one cell";
 });
 
 painters.push((what) => {
@@ -55,7 +53,7 @@ painters.push((what) => {
   const told = explanationOf(radar, state.frame);
   const rows = found.slice(0, 300).map((d) => choosable(d.row === state.pick, () => choose(d),
     el("td", { class: "n" }, String(d.row + 1)),
-    el("td", {}, dot(detectionColour(radar, d, state.frame)), nameOf(radar, d.object)),
+    el("td", { class: "name" }, dot(detectionColour(radar, d, state.frame)), nameOf(radar, d.object)),
     number(d.range), number(degrees(d.azimuth), 2), number(degrees(d.elevation), 2), number(d.velocity), number(d.snr_db, 1), number(d.rcs_dbsm, 1),
     el("td", {}, [told && told.labels[d.row] !== "direct" && told.labels[d.row], d.ambiguous ? "ambiguous" : ""].filter(Boolean).join(", "))));
   const columns = [["#", 1], ["object"], ["range [m]", 1], ["azimuth [°]", 1], ["elevation [°]", 1], ["range rate [m/s]", 1], ["SNR [dB]", 1], ["RCS [dBsm]", 1], [""]];
