@@ -15,7 +15,7 @@ import shenron_rt as srt
 from shenron_rt.cli import main
 
 #: Picture of the documentation: pixels, and colours that keep it below 200 kB.
-SIZE, COLOURS = (1440, 1180), 96
+SIZE, COLOURS = (1440, 1000), 256
 
 
 def picture(page: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""Drives a headless Chromium over its DevTools pipe (file descriptors 3 and 4, JSON ended by a zero byte): no library."""
+"""Drives a headless Chromium over its DevTools pipe: JSON, ended by a zero byte, in descriptors 3 and 4; no library."""
 
 from __future__ import annotations
 

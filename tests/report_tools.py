@@ -22,10 +22,13 @@ seed: 5
 frame_period_s: 0.1
 ego: {xyz_m: [10, 5, 0], ypr_deg: [30, 0, 0], velocity_mps: [8.66, 5, 0]}
 static:
-  - {name: wall, shape: "box:10x0.3x3", xyz_m: [24, 18, 1.5], ypr_deg: [30, 0, 0], tag: Walls, material: concrete, id: 40}
+  - {id: 40, name: wall, shape: "box:10x0.3x3", xyz_m: [24, 18, 1.5], ypr_deg: [30, 0, 0], tag: Walls,
+     material: concrete}
 actors:
-  - {id: 101, name: NAME, shape: "box:4x2x1.5", xyz_m: [29.05, 16, 0.8], ypr_deg: [30, 0, 0], velocity_mps: [4.33, 2.5, 0], yaw_rate_deg_s: 5, tag: Car, material: car_paint}
-  - {id: 102, name: behind, shape: "box:1x1x1", aim: 2000, xyz_m: [-20, -10, 0.5], tag: Other, material: concrete}
+  - {id: 101, name: NAME, shape: "box:4x2x1.5", xyz_m: [29.05, 16, 0.8], ypr_deg: [30, 0, 0],
+     velocity_mps: [4.33, 2.5, 0], yaw_rate_deg_s: 5, tag: Car, material: car_paint}
+  - {id: 102, name: inside, shape: "box:1x1x1", aim: 500, xyz_m: [-20, -10, 1.5], tag: Other, material: concrete}
+  - {id: 103, name: shell, shape: "box:3x3x3", aim: 500, xyz_m: [-20, -10, 1.5], tag: Other, material: concrete}
 point_targets:
   - {id: 900, name: post, xyz_m: [27, 12, 1], rcs_dbsm: 5}
 radars:
@@ -80,7 +83,14 @@ class Page(html.parser.HTMLParser):
     def detections(self, prefix: str, frame: int) -> dict[str, np.ndarray]:
         """Return the columns of the detections of one frame."""
         radar = next(r for r in self.about["radars"] if r["prefix"] == prefix)
-        rows = slice(radar["detections"][frame], radar["detections"][frame + 1])
+        rows = slice(*radar["detections"]["start"][frame : frame + 2])
         table = self.arrays[f"{prefix}.detections"]
         columns = {n: table[i, rows] for i, n in enumerate(self.about["columns"]["detections"])}
         return columns | {"object_id": self.arrays[f"{prefix}.detection_id"][rows]}
+
+    def chains(self, prefix: str, frame: int) -> tuple[list[str], list[bool]]:
+        """Return chain and ghost of the detections of one frame."""
+        known = next(r for r in self.about["radars"] if r["prefix"] == prefix)["detections"]
+        rows = slice(*known["start"][frame : frame + 2])
+        chains = [known["chains"][i] for i in self.arrays[f"{prefix}.detection_chain"][rows]]
+        return chains, self.arrays[f"{prefix}.detection_ghost"][rows].astype(bool).tolist()

@@ -19,7 +19,7 @@ from shenron_rt.cli.common import Overrides, complain, frame_range, log_to_stder
 from shenron_rt.config.profile import load_profile
 from shenron_rt.errors import InputError
 
-VERBS = ("run", "rcs", "cast-lidar", "process", "resolve", "validate", "profiles", "materials", "doctor")
+VERBS = ("run", "rcs", "cast-lidar", "process", "report", "resolve", "validate", "profiles", "materials", "doctor")
 
 
 @pytest.fixture(autouse=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import shutil
@@ -13,8 +12,6 @@ import pytest
 from report_tools import FRAMES, NASTY, Page, street_run
 
 import shenron_rt as srt
-from shenron_rt.cli import main
-from shenron_rt.errors import InputError, NotFoundError
 from shenron_rt.plot._style import dbm
 from shenron_rt.plot.truth import truth_of
 from shenron_rt.report.arrays import script_json
@@ -40,7 +37,9 @@ def page(run: Path) -> Page:
 # ---- one file
 def test_the_page_stands_beside_the_run_and_refers_to_nothing_outside(run: Path, page: Page) -> None:
     assert run.with_name("run.html").is_file()
-    targets = [v for _, attributes in page.tags for k, v in attributes.items() if k in ("src", "href", "data", "action")]
+    targets = [
+        v for _, attributes in page.tags for k, v in attributes.items() if k in ("src", "href", "data", "action")
+    ]
     assert targets == ["#play"]
     assert re.findall(r"@import|url\(|fetch\(|XMLHttpRequest|WebSocket|import\(", page.text) == []
     (policy,) = (a["content"] for t, a in page.tags if t == "meta" and "http-equiv" in a)
@@ -79,6 +78,23 @@ def test_detections_are_those_of_the_run(run: Path, page: Page, prefix: str) -> 
         for name, column in page.detections(prefix, k).items():
             np.testing.assert_allclose(column, table[name].astype(np.float64), rtol=FLOAT32, err_msg=name)
     assert total > 0
+
+
+def test_chains_and_ghosts_are_those_of_the_run(run: Path, page: Page, tmp_path: Path) -> None:
+    chains, ghosts = page.chains("r0", 1)
+    found = srt.Detections.from_csv(run / "radars/front/frame_000001/detections.csv")
+    assert chains == found.chain.tolist()
+    assert not any(ghosts)
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    rows = ["40>101,1", *(["101,0"] * (len(found) - 1))]
+    text = "\n".join(["chain,ghost", *rows])
+    (copy / "radars/front/frame_000001/detections.chains.csv").write_text(text + "\n", encoding="utf-8")
+    made = Page(srt.write_report(copy))
+    chains, ghosts = made.chains("r0", 1)
+    assert chains == ["40>101", *(["101"] * (len(found) - 1))]
+    assert ghosts == [True, *([False] * (len(found) - 1))]
+    assert not any(made.chains("r0", 0)[1])
 
 
 @pytest.mark.parametrize(("short", "name"), [("rd", "range_doppler"), ("ra", "range_azimuth")])
@@ -137,7 +153,7 @@ def test_an_object_without_an_echo_stands_where_its_body_is(run: Path, page: Pag
     columns = {n: i for i, n in enumerate(page.about["columns"]["truth"])}
     values = page.arrays["r0.truth"][rows[102]]
     assert np.all(values[columns["echoes"]] == 0)
-    # 102 stands at (-20, -10, 0.5); the radar at t = frame + mid-frame drives from (10, 5) + R30 (2, 0), height 1
+    # 102 stands at (-20, -10, 1.5), inside another; the radar drives from (10, 5) + R30 (2, 0), 1 m up
     scene = srt.load_scene(run / "config.yaml")
     mid = scene.profile_of(scene.radars[0]).frame_mid_s
     heading = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])
@@ -239,138 +255,3 @@ def test_standing_is_white_and_power_gets_lighter() -> None:
     luma = sequential().astype(float) @ [0.2126, 0.7152, 0.0722]
     assert np.all(np.diff(luma) > -0.5)  # rounding to 8 bits
     assert luma[-1] - luma[0] > 150
-
-
-# ---- what other verbs found
-def _track_file(folder: Path, run: Path) -> Path:
-    names = (
-        "frame", "time_s", "track", "coasting", "x_m", "y_m", "vx_mps", "vy_mps", "std_x_m", "std_y_m", "length_m",
-        "width_m", "range_m", "azimuth_deg", "detections", "object_id",
-    )  # fmt: skip
-    file = folder / "tracks.csv"
-    with file.open("w", encoding="utf-8", newline="") as text:
-        writer = csv.DictWriter(text, names)
-        writer.writeheader()
-        for k, owner in enumerate((101, -1, 101)):
-            row = dict.fromkeys(names, 0.5) | {"frame": k, "track": 3, "coasting": 0, "x_m": 30 + k, "object_id": owner}
-            writer.writerow(row)
-    (folder / "tracks.json").write_text('{"radar": "front", "ospa_m": 0.25, "tracks_of": {}}', encoding="utf-8")
-    return file
-
-
-def test_tracks_are_taken_from_their_table(run: Path, tmp_path: Path) -> None:
-    _track_file(tmp_path, run)
-    made = Page(srt.write_report(run, tmp_path / "a.html", tracks=tmp_path))
-    (track,) = made.about["tracks"]["tracks"]
-    assert (track["track"], track["object_id"]) == (3, 101)
-    assert [row[:2] for row in track["rows"]] == [[0, 30], [1, 31], [2, 32]]
-    assert made.about["tracks"]["figures"] == {"radar": "front", "ospa_m": 0.25}
-
-
-def test_explanations_are_taken_from_their_file(run: Path, tmp_path: Path) -> None:
-    verdict = {"name": "masked", "by": "wall", "text": "masked by wall", "numbers": {"margin_db": 1.25}, "change": "x"}
-    stage = {"name": "transmit power", "gain_db": 10.0, "level": 10.0, "unit": "dBm", "note": "Pt"}
-    item = {"object_id": 101, "verdict": verdict, "power_dbm": -101.123456, "waterfall": {"stages": [stage], "closes": True}}
-    frame = {"radar": "front", "frame": 1, "time_s": 0.1, "objects": [item], "detection_labels": ["direct"]}
-    file = tmp_path / "explain.json"
-    file.write_text(json.dumps({"frames": [frame], "evidence": []}), encoding="utf-8")
-    made = Page(srt.write_report(run, tmp_path / "a.html", explained=file))
-    front, left = made.about["radars"]
-    assert left["explained"] is None
-    row = [o["id"] for o in front["objects"]].index(101)
-    assert front["explained"]["has"] == [False, True, False]
-    assert front["explained"]["verdicts"][row] == [None, "masked", None]
-    shown = made.json["r0.explain.1"]["objects"]["101"]
-    assert (shown["verdict"], shown["by"], shown["power_dbm"]) == ("masked", "wall", -101.1235)
-    assert shown["stages"] == [["transmit power", 10.0, 10.0, "dBm", "Pt"]]
-
-
-@pytest.mark.parametrize(
-    ("option", "name", "text", "said"),
-    [
-        ("tracks", "tracks.csv", "frame,x\n1,2\n", "no column"),
-        ("explained", "explain.json", "{", "not what shenron-rt explain writes"),
-        ("explained", "explain.json", '{"frames": [{"radar": "front", "frame": 0, "objects": [{}]}]}', "not what"),
-    ],
-)
-def test_files_of_another_kind_are_refused(run: Path, tmp_path: Path, option: str, name: str, text: str, said: str) -> None:
-    (tmp_path / name).write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=said):
-        srt.write_report(run, tmp_path / "a.html", **{option: tmp_path})
-    assert not (tmp_path / "a.html").exists()
-
-
-def test_files_that_are_not_there_are_refused(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(NotFoundError, match=r"tracks\.csv"):
-        srt.write_report(run, tmp_path / "a.html", tracks=tmp_path)
-
-
-# ---- the command line
-def test_the_command_writes_and_refuses_to_replace(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    target = tmp_path / "page.html"
-    assert main(["report", str(run), "-o", str(target), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said == {"path": str(target), "bytes": target.stat().st_size, "frames": 2 * FRAMES}
-    before = target.read_bytes()
-    assert main(["report", str(run), "-o", str(target)]) == 2
-    err = capsys.readouterr().err
-    assert "--overwrite" in err
-    assert err.count("\n") == 1
-    assert main(["report", str(run), "-o", str(target), "--overwrite"]) == 0
-    assert target.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == ["page.html"]
-
-
-def test_a_page_that_cannot_be_made_leaves_the_old_one(run: Path, tmp_path: Path) -> None:
-    copy, target = tmp_path / "run", tmp_path / "page.html"
-    shutil.copytree(run, copy)
-    (copy / "radars/left/frame_000002/cube.npz").write_bytes(b"not an archive")
-    target.write_text("old", encoding="utf-8")
-    with pytest.raises(InputError, match=r"frame_000002/cube\.npz"):
-        srt.write_report(copy, target, overwrite=True)
-    assert target.read_text(encoding="utf-8") == "old"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["page.html", "run"]
-
-
-@pytest.mark.parametrize("kind", ["missing", "empty", "folder", "without radars"])
-def test_what_is_no_run_is_told_in_one_line(
-    kind: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = tmp_path / "x"
-    arguments = ["report", str(folder)]
-    if kind == "empty":
-        folder.mkdir()
-    elif kind == "folder":
-        arguments = ["report", str(run), "-o", str(tmp_path)]
-    elif kind == "without radars":
-        folder.mkdir()
-        (folder / "summary.json").write_text('{"version": "0"}', encoding="utf-8")
-    assert main(arguments) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert {"missing": "not a run folder", "empty": "not a run folder", "folder": "is a folder"}.get(kind, "without frames") in err
-
-
-def test_runs_without_a_scene_have_a_page_too(run: Path, tmp_path: Path) -> None:
-    adc = run / "radars/front/frame_000000/adc.npz"
-    assert main(["process", str(adc), "-o", str(tmp_path / "processed"), "--no-pictures"]) == 0
-    made = Page(srt.write_report(tmp_path / "processed"))
-    (radar,) = made.about["radars"]
-    assert radar["bodies"] == made.about["meshes"] == []
-    assert "r0.rd.0" in made.arrays
-    assert "r0.radar" not in made.arrays  # nobody knows how that radar moved
-    assert len(made.detections("r0", 0)["range"]) > 0
-
-
-def test_runs_that_kept_no_cubes_have_a_page_without_maps(run: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "run"
-    shutil.copytree(run, copy, ignore=shutil.ignore_patterns("*.npz"))
-    made = Page(srt.write_report(copy))
-    radar = made.about["radars"][0]
-    assert radar["maps"] is None
-    assert len(made.detections("r0", 0)["range"]) > 0
-    # truth then is where the bodies are
-    columns = {n: i for i, n in enumerate(made.about["columns"]["truth"])}
-    row = [o["id"] for o in radar["objects"]].index(101)
-    assert np.all(made.arrays["r0.truth"][row, columns["echoes"]] == 0)
-    assert np.all(np.isfinite(made.arrays["r0.truth"][row, columns["range_m"]]))

@@ -204,7 +204,8 @@ def test_focus_is_visible_and_everything_has_a_name(page: Browser) -> None:
 
 
 def test_the_other_radar_has_its_own_numbers(run: Path, page: Browser) -> None:
-    page.evaluate("(() => { const s = document.getElementById('radar'); s.value = '1'; s.dispatchEvent(new Event('change')); })()")
+    select = "document.getElementById('radar')"
+    page.evaluate(f"{select}.value = '1'; {select}.dispatchEvent(new Event('change'))")
     page.settle()
     table = srt.Detections.from_csv(run / "radars/left/frame_000000/detections.csv").table
     assert [float(row[2]) for row in _cells(page, "detections")] == pytest.approx(table["range"], abs=0.00501)

@@ -45,7 +45,7 @@ class SceneMeshes:
 
     @classmethod
     def add_to(cls, arrays: Arrays, scene: Scene, most_faces: int) -> SceneMeshes:
-        """Add ``m<k>.vertices`` (v, 3) float32 [m], ``m<k>.faces`` (f, 3) and ``m<k>.edges`` (e, 2) uint32 of each mesh.
+        """Add ``m<k>.vertices`` (v, 3) float32 [m], ``m<k>.faces`` (f, 3), ``m<k>.edges`` (e, 2) uint32 of each mesh.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class SceneMeshes:
         Parameters
         ----------
         arrays : Arrays
-            Gets ``<prefix>.poses``, (bodies, frames, 12) float32: rotation (9) and origin (3) of each body in the world,
+            Gets ``<prefix>.poses``, (bodies, frames, 12) float32: rotation (9) and origin (3) of bodies in the world,
             and ``<prefix>.radar``, (frames, 15): those of the radar, and its velocity (3).
         prefix : str
         radar : RadarFiles

@@ -39,14 +39,14 @@ class MapPools:
         self.pools: dict[str, tuple[int, int]] = {}
 
     def levels(self, maps: Mapping[str, FloatArray] | None) -> dict[str, FloatArray]:
-        """Return both maps pooled [dBm], float32 by short name; empty without maps."""
+        """Return both maps pooled [dBm] by short name; empty without maps."""
         if maps is None:
             return {}
         self.axes = self.axes or {name: maps[name] for name in ("range_m", "velocity_mps", "azimuth_rad")}
-        found = {}
+        found: dict[str, FloatArray] = {}
         for short, name in MAPS.items():
             pool = self.pools.setdefault(short, _pool(maps[name].shape, self._most))
-            found[short] = dbm(pooled(maps[name], pool)).astype(np.float32)
+            found[short] = dbm(pooled(maps[name], pool))
         return found
 
 

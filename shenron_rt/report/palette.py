@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._typing import IntArray
+from .._typing import FloatArray, IntArray
 
 __all__ = ["diverging", "sequential"]
 
@@ -13,7 +13,8 @@ def sequential() -> IntArray:
     """Return viridis, (256, 3) uint8."""
     from matplotlib import colormaps
 
-    return np.rint(colormaps["viridis"](np.arange(256))[:, :3] * 255).astype(np.uint8)
+    colours: FloatArray = colormaps["viridis"](np.arange(256))[:, :3]
+    return np.asarray(np.rint(colours * 255), dtype=np.uint8)
 
 
 def diverging() -> IntArray:
@@ -28,4 +29,4 @@ def diverging() -> IntArray:
     # the map's own middle is a light grey: lift each colour by what its lightness is short of there
     weight = 1 - np.abs(np.linspace(-1, 1, 255))
     lifted = lut + (1 - lut[127]) * weight[:, None] ** 4
-    return np.rint(np.clip(lifted, 0, 1) * 255).astype(np.uint8)
+    return np.asarray(np.rint(np.clip(lifted, 0, 1) * 255), dtype=np.uint8)

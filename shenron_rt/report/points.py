@@ -23,19 +23,31 @@ DETECTION_COLUMNS = tuple(n for n in DETECTION_DTYPE.names or () if n not in ("e
 _ECHO_SPAN_DB = 60.0
 
 
-def add_detections(arrays: Arrays, prefix: str, found: Sequence[Detections | None]) -> list[int]:
-    """Add ``<prefix>.detections``, (columns, n) float32, and ``<prefix>.detection_id``, (n,) float64, frame by frame.
+def add_detections(arrays: Arrays, prefix: str, found: Sequence[Detections | None]) -> dict[str, Any]:
+    """Add the detections of a radar, frame by frame.
+
+    Parameters
+    ----------
+    arrays : Arrays
+        Gets ``<prefix>.detections``, (columns, n) float32, ``<prefix>.detection_id``, (n,) float64,
+        ``<prefix>.detection_ghost``, (n,) uint8, and ``<prefix>.detection_chain``, (n,) uint32 rows of ``chains``.
+    prefix : str
+    found : sequence
 
     Returns
     -------
-    list of int
-        Where the rows of each frame begin, and n.
+    dict
+        ``start``: where the rows of each frame begin, and n; ``chains``: the different chains.
     """
     tables = [np.zeros(0, DETECTION_DTYPE) if d is None else d.table for d in found]
     table = np.concatenate(tables)
     arrays.add(f"{prefix}.detections", np.stack([table[name].astype(np.float64) for name in DETECTION_COLUMNS]), "f4")
     arrays.add(f"{prefix}.detection_id", table["object_id"], "f8")
-    return _starts(tables)
+    known = [d for d in found if d is not None]
+    arrays.add(f"{prefix}.detection_ghost", np.concatenate([np.zeros(0, bool), *(d.ghost for d in known)]), "u1")
+    chains, row = np.unique(np.concatenate([np.zeros(0, "U1"), *(d.chain for d in known)]), return_inverse=True)
+    arrays.add(f"{prefix}.detection_chain", row, "u4")
+    return {"start": _starts(tables), "chains": chains.tolist()}
 
 
 def sampled_echoes(returns: Returns | None, most: int) -> tuple[FloatArray, FloatArray, int] | None:

@@ -125,9 +125,7 @@ def open_run(path: str | os.PathLike[str]) -> RunFiles:
     return RunFiles(run.root, scene, run.config.read_text(encoding="utf-8"), run.summary, tuple(radars))
 
 
-def _frames(
-    records: list[Mapping[str, Any]], folders: list[Path], profile: RadarProfile
-) -> tuple[FrameFiles, ...]:
+def _frames(records: list[Mapping[str, Any]], folders: list[Path], profile: RadarProfile) -> tuple[FrameFiles, ...]:
     pairs = zip(records, folders, strict=True)
     starts = ((int(r["frame"]), float(r.get("time_s") or 0.0), folder, r) for r, folder in pairs)
     return tuple(FrameFiles(k, t, t + profile.frame_mid_s, folder, r) for k, t, folder, r in starts)

@@ -108,9 +108,7 @@ def check_page(path: Path, overwrite: bool) -> None:
         raise InputError(f"-o {path}: exists; give another name, or --overwrite to replace it")
 
 
-def _page(
-    source: RunFiles, tracks: Tracked, explained: Explained, progress: Callable[[str], object]
-) -> str:
+def _page(source: RunFiles, tracks: Tracked, explained: Explained, progress: Callable[[str], object]) -> str:
     arrays = Arrays()
     arrays.add("lut.sequential", sequential(), "u1")
     arrays.add("lut.diverging", diverging(), "u1")

@@ -143,10 +143,11 @@ function labeller(ctx, right, colour, halo) {
   };
 }
 
-// A ring around a detection, dark around light: seen on every colour of a map.
-function ring(ctx, x, y, radius, colour, width = 1.4) {
+// A ring around a detection, a square around a ghost; dark around light, so that it is seen on every colour of a map.
+function ring(ctx, x, y, radius, colour, width, ghost) {
   ctx.beginPath();
-  ctx.arc(x, y, radius, 0, 2 * Math.PI);
+  if (ghost) ctx.rect(x - radius, y - radius, 2 * radius, 2 * radius);
+  else ctx.arc(x, y, radius, 0, 2 * Math.PI);
   ctx.lineWidth = width + 1.8;
   ctx.strokeStyle = "rgba(0,0,0,0.55)";
   ctx.stroke();

@@ -81,11 +81,12 @@ const TRUTH = Object.fromEntries(about.columns.truth.map((name, i) => [name, i])
 // Detections of one frame as objects, angles in rad, strongest first; "row" counts within the frame.
 function detectionsOf(radar, frame) {
   const table = array(`${radar.prefix}.detections`);
-  const ids = array(`${radar.prefix}.detection_id`).data;
+  const [ids, ghosts, chains] = ["id", "ghost", "chain"].map((name) => array(`${radar.prefix}.detection_${name}`).data);
   const total = table.shape[1];
+  const { start } = radar.detections;
   const rows = [];
-  for (let i = radar.detections[frame]; i < radar.detections[frame + 1]; i++) {
-    const row = { row: i - radar.detections[frame], object: ids[i] };
+  for (let i = start[frame]; i < start[frame + 1]; i++) {
+    const row = { row: i - start[frame], object: ids[i], ghost: ghosts[i] === 1, chain: radar.detections.chains[chains[i]] };
     for (const name in DETECTION) row[name] = table.data[DETECTION[name] * total + i];
     rows.push(row);
   }
@@ -129,6 +130,11 @@ function nameOf(radar, id) {
   if (id < 0) return "noise";
   const object = radar.objects.find((o) => o.id === id);
   return object ? object.name : `object ${id}`;
+}
+
+// The things a wave met between leaving the radar and coming back, by name.
+function chainWords(radar, chain) {
+  return chain.split(">").map((id) => nameOf(radar, Number(id))).join(" → ");
 }
 
 // An element with attributes and children; text stays text.

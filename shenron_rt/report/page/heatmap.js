@@ -142,7 +142,7 @@ function mapMarks(ctx, radar, placeD, placeT, right) {
   for (const d of detectionsOf(radar, state.frame)) {
     const [x, y] = placeD(d);
     const chosen = d.row === state.pick;
-    ring(ctx, x, y, chosen ? 7.5 : 5.5, chosen || (state.object > 0 && d.object === state.object) ? PICKED : MAP_RING, chosen ? 2.4 : 1.4);
+    ring(ctx, x, y, chosen ? 7.5 : 5.5, chosen || (state.object > 0 && d.object === state.object) ? PICKED : MAP_RING, chosen ? 2.4 : 1.4, d.ghost);
   }
   for (const t of truthsOf(radar, state.frame)) {
     if (!(t.id > 0) || !t.echoes) continue;

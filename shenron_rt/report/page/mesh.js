@@ -4,12 +4,14 @@ uniform mat4 clip; uniform mat4 model; in vec3 position; out vec3 at;
 void main() { vec4 p = model * vec4(position, 1.0); at = p.xyz; gl_Position = clip * p; }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec3 colour; uniform float lit; in vec3 at; out vec4 result;
+uniform vec4 colour; uniform float lit; in vec3 at; out vec4 result;
 void main() {
   vec3 n = normalize(cross(dFdx(at), dFdy(at)));
   float light = mix(1.0, 0.62 + 0.38 * abs(dot(n, normalize(vec3(-0.45, 0.35, 0.82)))), lit);
-  result = vec4(colour * light, 1.0);
+  result = vec4(colour.rgb * light * colour.a, colour.a);
 }`;
+// Meshes with more edges get fainter ones: drawn in full, they would cover the surfaces.
+const FEW_EDGES = 300;
 let gpu = null;
 
 function openGpu() {
@@ -83,6 +85,8 @@ function paintMeshes(clip) {
   gl.enable(gl.DEPTH_TEST);
   gl.enable(gl.POLYGON_OFFSET_FILL);
   gl.polygonOffset(1.5, 1.5);
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   gl.useProgram(program);
   gl.uniformMatrix4fv(place.clip, false, new Float32Array(clip));
   gl.enableVertexAttribArray(position);
@@ -97,12 +101,13 @@ function paintMeshes(clip) {
     const chosen = body.id > 0 && body.id === state.object;
     for (const [tag, first, count] of mesh.runs) {
       const own = surfaceColour(tag);
-      gl.uniform3fv(place.colour, chosen ? rgb(objectColour(radar, body.id)).map((v, i) => 0.45 * v + 0.55 * own[i]) : own);
+      const tint = chosen ? rgb(objectColour(radar, body.id)).map((v, i) => 0.45 * v + 0.55 * own[i]) : own;
+      gl.uniform4f(place.colour, ...tint, 1);
       gl.drawElements(gl.TRIANGLES, 3 * count, gl.UNSIGNED_INT, 12 * first);
     }
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.edges);
     gl.uniform1f(place.lit, 0);
-    gl.uniform3fv(place.colour, edge);
+    gl.uniform4f(place.colour, ...edge, Math.min(1, Math.max(0.18, 2 * FEW_EDGES / (mesh.edgeCount + 1))));
     gl.drawElements(gl.LINES, mesh.edgeCount, gl.UNSIGNED_INT, 0);
   });
 }

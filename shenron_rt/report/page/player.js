@@ -45,7 +45,7 @@ painters.push((what) => {
   const slider = byId("slider");
   slider.max = String(radar.frames.length - 1);
   slider.value = String(state.frame);
-  const words = `frame ${frame.frame} · ${fixed(frame.mid_s, 3)} s · ${radar.detections[state.frame + 1] - radar.detections[state.frame]} detections`;
+  const words = `frame ${frame.frame} · ${fixed(frame.mid_s, 3)} s · ${radar.detections.start[state.frame + 1] - radar.detections.start[state.frame]} detections`;
   slider.setAttribute("aria-valuetext", words);
   byId("clock").textContent = words;
   byId("play").textContent = state.playing ? "❚❚" : "▶";

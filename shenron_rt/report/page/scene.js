@@ -129,7 +129,8 @@ function sceneDetections(ctx, radar, at) {
     }
     const radius = Math.min(7.5, Math.max(3, 2 + d.snr_db / 8));
     ctx.beginPath();
-    ctx.arc(p[0], p[1], radius, 0, 2 * Math.PI);
+    if (d.ghost) ctx.rect(p[0] - radius, p[1] - radius, 2 * radius, 2 * radius);
+    else ctx.arc(p[0], p[1], radius, 0, 2 * Math.PI);
     ctx.fillStyle = detectionColour(radar, d, state.frame);
     ctx.fill();
     ctx.lineWidth = 1.2;

@@ -58,7 +58,8 @@ function sceneLegend(ctx, radar, w, h) {
   ctx.fillStyle = c.muted;
   ctx.textAlign = "left";
   ctx.textBaseline = "top";
-  const marks = "● detection, larger with SNR   × truth" + (state.tracks ? "   - - path" : "");
+  const ghosts = array(`${radar.prefix}.detection_ghost`).data.includes(1);
+  const marks = `● detection, larger with SNR${ghosts ? "   ■ ghost" : ""}   × truth${state.tracks ? "   - - path" : ""}`;
   haloText(ctx, marks, state.view === "top" ? 48 : 8, 8, c.muted, c.stage);
   ctx.restore();
 }

@@ -55,11 +55,19 @@ painters.push((what) => {
     el("td", { class: "n" }, String(d.row + 1)),
     el("td", { class: "name" }, dot(detectionColour(radar, d, state.frame)), nameOf(radar, d.object)),
     number(d.range), number(degrees(d.azimuth), 2), number(degrees(d.elevation), 2), number(d.velocity), number(d.snr_db, 1), number(d.rcs_dbsm, 1),
-    el("td", {}, [told && told.labels[d.row] !== "direct" && told.labels[d.row], d.ambiguous ? "ambiguous" : ""].filter(Boolean).join(", "))));
+    el("td", {}, detectionNotes(radar, d, told))));
   const columns = [["#", 1], ["object"], ["range [m]", 1], ["azimuth [°]", 1], ["elevation [°]", 1], ["range rate [m/s]", 1], ["SNR [dB]", 1], ["RCS [dBsm]", 1], [""]];
   fill("detections", head(...columns), rows, "Nothing was detected in this frame.");
   byId("detections-note").textContent = `${found.length} in this frame${found.length > 300 ? ", the strongest 300 listed" : ", strongest first"}`;
 });
+
+// What else is known of a detection, in words.
+function detectionNotes(radar, d, told) {
+  const label = told && told.labels[d.row];
+  const notes = [d.ghost ? "ghost" : "", label && label !== "direct" && !(d.ghost && label.startsWith("ghost")) ? label : "", d.ambiguous ? "ambiguous" : ""];
+  if (d.chain.includes(">")) notes.push(`over ${chainWords(radar, d.chain)}`);
+  return notes.filter(Boolean).join(", ");
+}
 
 // ---- settings
 painters.push((what) => {
