@@ -14,8 +14,8 @@ from report_tools import FRAMES, NASTY, Page, street_run
 import shenron_rt as srt
 from shenron_rt.plot._style import dbm
 from shenron_rt.plot.truth import truth_of
-from shenron_rt.report.arrays import script_json
-from shenron_rt.report.geometry import rigid_motion
+from shenron_rt.report.arrays import Arrays, script_json
+from shenron_rt.report.geometry import SceneMeshes, rigid_motions
 from shenron_rt.report.maps import MapPools, pooled
 from shenron_rt.report.palette import diverging, sequential
 from shenron_rt.scene.world import build_world, load_bodies
@@ -177,10 +177,13 @@ def test_meshes_stand_where_the_world_has_them(run: Path, page: Page) -> None:
             eye = page.arrays[f"{prefix}.radar"][k].astype(np.float64)
             for b, body in enumerate(radar["bodies"]):
                 pose = page.arrays[f"{prefix}.poses"][b, k].astype(np.float64)
-                rest = page.arrays[f"m{body['mesh']}.vertices"].astype(np.float64)
+                mesh = f"m{body['mesh']}"
+                rest = page.arrays[f"{mesh}.vertices"].astype(np.float64)[page.arrays[f"{mesh}.faces"]].mean(axis=1)
                 there = rest @ pose[:9].reshape(3, 3).T + pose[9:]
                 seen = (there - eye[9:12]) @ eye[:9].reshape(3, 3)
-                placed = world.vertices[world.vertex_start[b] : world.vertex_start[b + 1]]
+                rows = world.face_body == b
+                order = np.argsort(world.face_tag[rows], kind="stable")
+                placed = world.vertices[world.faces[rows]].mean(axis=1)[order]
                 # rotations are good to 6e-8 over 50 m, and origins to half an ulp of 50 m: 2 um each
                 np.testing.assert_allclose(seen, placed, atol=2e-5)
 
@@ -241,9 +244,22 @@ def test_large_maps_are_pooled_until_they_fit(rng: np.random.Generator) -> None:
 def test_rigid_motion_is_found_again(flat: bool, rng: np.random.Generator) -> None:
     rest = rng.normal(size=(9, 3)) * [4, 2, 0 if flat else 1]
     rotation = srt.Pose((0, 0, 0), (130, -40, 20)).rotation
-    found, origin = rigid_motion(rest, rest @ rotation.T + [50, -3, 1])
-    np.testing.assert_allclose(found, rotation, atol=1e-12)
-    np.testing.assert_allclose(origin, [50, -3, 1], atol=1e-10)
+    found, origin = rigid_motions([rest, rest[:4]], [rest @ rotation.T + [50, -3, 1], rest[:4]])
+    np.testing.assert_allclose(found, [rotation, np.eye(3)], atol=1e-12)
+    np.testing.assert_allclose(origin, [[50, -3, 1], [0, 0, 0]], atol=1e-10)
+
+
+def test_the_smallest_faces_go_first_and_no_vertex_stays_without_one() -> None:
+    plates = [
+        {"shape": f"plate:{size}x{size}", "xyz_m": (20, 5 * k, 1), "tag": "Other", "material": "metal"}
+        for k, size in enumerate((1.0, 2.0, 3.0))
+    ]
+    arrays = Arrays()
+    n = srt.make_shape("plate:1x1").n_faces
+    meshes = SceneMeshes.add_to(arrays, srt.Scene(static=plates), most_faces=2 * n)
+    assert [m["all_faces"] for m in meshes.records] == [n, n, n]
+    assert [m["faces"] for m in meshes.records] == [0, n, n]
+    assert 'id="m0.edges"' in arrays.html()
 
 
 def test_standing_is_white_and_power_gets_lighter() -> None:

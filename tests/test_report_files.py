@@ -151,6 +151,23 @@ def test_runs_without_a_scene_have_a_page_too(run: Path, tmp_path: Path) -> None
     assert len(made.detections("r0", 0)["range"]) > 0
 
 
+def test_meshes_that_are_gone_are_left_out_with_a_warning(
+    run: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    config = (copy / "config.yaml").read_text(encoding="utf-8")
+    gone = config.replace("shape: box:4x2x1.5", "mesh: /nowhere/car.obj")
+    assert gone != config
+    (copy / "config.yaml").write_text(gone, encoding="utf-8")
+    made = Page(srt.write_report(copy))
+    assert "/nowhere/car.obj" in caplog.text
+    assert made.about["meshes"] == made.about["radars"][0]["bodies"] == []
+    # how the radar moves is known without them: 10 m/s along 30 degrees
+    eyes = made.arrays["r0.radar"]
+    np.testing.assert_allclose(eyes[:, 12:], np.tile([8.66, 5.0, 0.0], (FRAMES, 1)), rtol=1e-6, atol=1e-6)
+
+
 def test_runs_that_kept_no_cubes_have_a_page_without_maps(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy, ignore=shutil.ignore_patterns("*.npz"))

@@ -53,18 +53,18 @@ def add_truth(
     known = set(names) | {n for record in records for n in record} | {t.object_id for frame in echoing for t in frame}
     ids = [*sorted(n for n in known if n > 0), *([0] if 0 in known else [])]
     table = np.full((len(ids), len(TRUTH_COLUMNS), len(radar.frames)), np.nan)
-    for i, number in enumerate(ids):
-        if number in middles:
-            table[i, :5] = _of_middle(middles[number], np.array([f.mid_s for f in radar.frames]))
-            table[i, 8] = 0
-        for k, frame in enumerate(echoing):
-            for t in frame:
-                if t.object_id == number:
-                    table[i, :5, k] = (t.range_m, math.degrees(t.azimuth_rad), t.velocity_mps, t.x, t.y)
-                    table[i, 8, k] = 1
-        for k, record in enumerate(records):
-            if number in record:
-                table[i, 5:8, k] = _received(record[number])
+    row = {number: i for i, number in enumerate(ids)}
+    times = np.array([f.mid_s for f in radar.frames])
+    for number, middle in middles.items():
+        if number in row:
+            table[row[number], :5] = _of_middle(middle, times)
+            table[row[number], 8] = 0
+    for k, (frame, record) in enumerate(zip(echoing, records, strict=True)):
+        for t in frame:
+            table[row[t.object_id], :5, k] = (t.range_m, math.degrees(t.azimuth_rad), t.velocity_mps, t.x, t.y)
+            table[row[t.object_id], 8, k] = 1
+        for number, levels in record.items():
+            table[row[number], 5:8, k] = _received(levels)
     arrays.add(f"{prefix}.truth", table, "f4")
     tags = {n: o["tag"] for record in records for n, o in record.items() if o.get("tag")}
     return [{"id": n, "name": names.get(n, f"object {n}" if n else "static"), "tag": tags.get(n)} for n in ids]

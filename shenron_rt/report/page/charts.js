@@ -1,4 +1,5 @@
 // Over time: when each object was seen, and range, range rate, azimuth and SNR of the chosen one.
+const MOST_STRIPS = 24;
 let stripPlot = null;
 let chartPlot = null;
 const VERDICT_COLOURS = {
@@ -19,7 +20,7 @@ const verdictColour = (name) => (name === MISSED ? "#d05a4e" : VERDICT_COLOURS[n
 painters.push((what) => {
   if (!changedAny(what, "radar", "frame", "object")) return;
   const radar = radarNow();
-  const listed = radar.objects.map((o, i) => ({ ...o, i })).filter((o) => o.id > 0).slice(0, 24);
+  const listed = radar.objects.map((o, i) => ({ ...o, i })).filter((o) => o.id > 0).slice(0, MOST_STRIPS);
   const legend = [...new Set(listed.flatMap((o) => radar.frames.map((_, k) => verdictOf(radar, o.i, k))))].filter(Boolean);
   byId("strips").parentElement.style.height = `${Math.max(60, 17 * listed.length + 44)}px`;
   const { ctx, width, height } = surface("strips");
@@ -67,6 +68,18 @@ const CHARTS = [
 ];
 let series = { key: "" };
 
+// Root mean square of what the strongest detection of each frame is off the truth; NaN without any.
+function rmsError(radar, index, points, chart) {
+  if (!chart.truth || index < 0) return NaN;
+  const direct = points.filter((p) => !p.d.ghost);
+  const strongest = direct.filter((p, i) => i === 0 || direct[i - 1].k !== p.k);
+  const off = strongest.map((p) => {
+    const truth = truthValue(radar, index, chart.truth, p.k);
+    return chart.fold ? folded(radar, chart.of(p.d) - truth) : chart.of(p.d) - truth;
+  }).filter(Number.isFinite);
+  return off.length ? Math.sqrt(off.reduce((sum, v) => sum + v * v, 0) / off.length) : NaN;
+}
+
 // All detections of an object, with their times; kept until radar or object change.
 function seriesOf(radar) {
   const key = `${radar.prefix} ${state.object}`;
@@ -75,7 +88,8 @@ function seriesOf(radar) {
   radar.frames.forEach((frame, k) => {
     for (const d of detectionsOf(radar, k)) if (d.object === state.object) points.push({ t: frame.mid_s, k, d });
   });
-  series = { key, points, index: radar.objects.findIndex((o) => o.id === state.object) };
+  const index = radar.objects.findIndex((o) => o.id === state.object);
+  series = { key, points, index, errors: CHARTS.map((chart) => rmsError(radar, index, points, chart)) };
   return series;
 }
 
@@ -83,7 +97,7 @@ painters.push((what) => {
   if (!changedAny(what, "radar", "frame", "object")) return;
   const { ctx, width, height } = surface("charts");
   const radar = radarNow();
-  const { points, index } = seriesOf(radar);
+  const { points, index, errors } = seriesOf(radar);
   const times = radar.frames.map((f) => f.mid_s);
   const pad = times.length > 1 ? 0 : 0.5;
   byId("history-note").textContent = index < 0 ? "" : `${radar.objects[index].name}: line truth, dots detections${tracksOf(radar).length ? ", thick line track" : ""}`;
@@ -102,7 +116,7 @@ painters.push((what) => {
     const [low, high] = spread(values, chart.least || 2);
     const xs = scale(times[0] - pad, times[times.length - 1] + pad, box.x, box.x + box.w);
     const ys = scale(low, high, box.y + box.h, box.y);
-    chartFrame(ctx, box, xs, ys, chart, n, xs(times[state.frame]));
+    chartFrame(ctx, box, xs, ys, chart, n, xs(times[state.frame]), errors[n]);
     ctx.save();
     ctx.beginPath();
     ctx.rect(box.x, box.y - 1, box.w, box.h + 2);
@@ -132,13 +146,18 @@ function spread(values, least) {
   return [low - room, high + room];
 }
 
-function chartFrame(ctx, box, xs, ys, chart, n, now) {
+function chartFrame(ctx, box, xs, ys, chart, n, now, error) {
   const c = ink();
   axes(ctx, box, xs, ys, { x: n > 1 ? "scene time [s]" : "", grid: true, xCount: box.w / 60, yCount: box.h / 28 });
   ctx.fillStyle = c.ink;
   ctx.textAlign = "left";
   ctx.textBaseline = "alphabetic";
   ctx.fillText(chart.title, box.x, box.y - 6);
+  if (Number.isFinite(error)) {
+    ctx.fillStyle = c.muted;
+    ctx.textAlign = "right";
+    ctx.fillText(`rms off truth ${fixed(error)}`, box.x + box.w, box.y - 6);
+  }
   ctx.strokeStyle = c.accent;
   ctx.lineWidth = 1.2;
   line(ctx, now, box.y, now, box.y + box.h);

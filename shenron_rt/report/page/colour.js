@@ -19,9 +19,14 @@ const OBJECT_COLOURS = [
 ];
 const REST_COLOUR = "#8b98a6";
 
+const objectColours = new Map();
+
 function objectColour(radar, id) {
-  const index = radar.objects.filter((o) => o.id > 0).findIndex((o) => o.id === id);
-  return index < 0 ? REST_COLOUR : OBJECT_COLOURS[index % OBJECT_COLOURS.length];
+  if (!objectColours.has(radar)) {
+    const named = radar.objects.filter((o) => o.id > 0);
+    objectColours.set(radar, new Map(named.map((o, i) => [o.id, OBJECT_COLOURS[i % OBJECT_COLOURS.length]])));
+  }
+  return objectColours.get(radar).get(id) || REST_COLOUR;
 }
 
 // ---- how detections are coloured

@@ -126,10 +126,10 @@ function fixed(value, digits = 2) {
 
 const degrees = (radians) => (radians * 180) / Math.PI;
 
+const names = new Map();
 function nameOf(radar, id) {
-  if (id < 0) return "noise";
-  const object = radar.objects.find((o) => o.id === id);
-  return object ? object.name : `object ${id}`;
+  if (!names.has(radar)) names.set(radar, new Map(radar.objects.map((o) => [o.id, o.name])));
+  return id < 0 ? "noise" : names.get(radar).get(id) || `object ${id}`;
 }
 
 // The things a wave met between leaving the radar and coming back, by name.

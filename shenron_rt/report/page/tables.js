@@ -1,4 +1,6 @@
 // Tables: what the run is, objects and detections of the frame, settings.
+const MOST_ROWS = 200;
+
 function head(...columns) {
   return el("thead", {}, el("tr", {}, ...columns.map(([text, number]) => el("th", { class: number ? "n" : null, scope: "col" }, text))));
 }
@@ -31,7 +33,10 @@ painters.push((what) => {
   if (!changedAny(what, "radar", "frame", "object")) return;
   const radar = radarNow();
   const told = explanationOf(radar, state.frame);
-  const rows = truthsOf(radar, state.frame).map((t) => {
+  const all = truthsOf(radar, state.frame);
+  const level = (t) => (t.id === state.object ? Infinity : Number.isFinite(t.power_dbm) ? t.power_dbm : -999);
+  const listed = all.length <= MOST_ROWS ? all : [...all].sort((a, b) => level(b) - level(a)).slice(0, MOST_ROWS);
+  const rows = listed.map((t) => {
     const why = told && told.objects[String(t.id)];
     const verdict = verdictOf(radar, t.index, state.frame);
     const good = verdict === "detected";
@@ -43,7 +48,8 @@ painters.push((what) => {
   });
   const columns = [["object"], ["tag"], ["range [m]", 1], ["azimuth [°]", 1], ["range rate [m/s]", 1], ["power [dBm]", 1], ["SNR [dB]", 1], [radar.explained ? "verdict" : "seen"]];
   fill("objects", head(...columns), rows, "The run knows of no objects.");
-  byId("objects-note").textContent = "truth at mid-frame; SNR as if its whole power fell on the centre of one cell";
+  const few = all.length > MOST_ROWS ? `strongest ${MOST_ROWS} of ${all.length}; ` : "";
+  byId("objects-note").textContent = few + "truth at mid-frame; SNR as if its whole power fell on the centre of one cell";
 });
 
 painters.push((what) => {
@@ -51,14 +57,14 @@ painters.push((what) => {
   const radar = radarNow();
   const found = detectionsOf(radar, state.frame);
   const told = explanationOf(radar, state.frame);
-  const rows = found.slice(0, 300).map((d) => choosable(d.row === state.pick, () => choose(d),
+  const rows = found.slice(0, MOST_ROWS).map((d) => choosable(d.row === state.pick, () => choose(d),
     el("td", { class: "n" }, String(d.row + 1)),
     el("td", { class: "name" }, dot(detectionColour(radar, d, state.frame)), nameOf(radar, d.object)),
     number(d.range), number(degrees(d.azimuth), 2), number(degrees(d.elevation), 2), number(d.velocity), number(d.snr_db, 1), number(d.rcs_dbsm, 1),
     el("td", {}, detectionNotes(radar, d, told))));
   const columns = [["#", 1], ["object"], ["range [m]", 1], ["azimuth [°]", 1], ["elevation [°]", 1], ["range rate [m/s]", 1], ["SNR [dB]", 1], ["RCS [dBsm]", 1], [""]];
   fill("detections", head(...columns), rows, "Nothing was detected in this frame.");
-  byId("detections-note").textContent = `${found.length} in this frame${found.length > 300 ? ", the strongest 300 listed" : ", strongest first"}`;
+  byId("detections-note").textContent = `${found.length} in this frame${found.length > MOST_ROWS ? `, the strongest ${MOST_ROWS} listed` : ", strongest first"}`;
 });
 
 // What else is known of a detection, in words.
