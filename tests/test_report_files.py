@@ -121,7 +121,7 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(run: Path, tmp_path: Path
     assert sorted(p.name for p in tmp_path.iterdir()) == ["page.html", "run"]
 
 
-@pytest.mark.parametrize("kind", ["missing", "empty", "folder", "without radars"])
+@pytest.mark.parametrize("kind", ["missing", "empty", "folder", "without radars", "without config"])
 def test_what_is_no_run_is_told_in_one_line(
     kind: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,10 +134,14 @@ def test_what_is_no_run_is_told_in_one_line(
     elif kind == "without radars":
         folder.mkdir()
         (folder / "summary.json").write_text('{"version": "0"}', encoding="utf-8")
+    elif kind == "without config":
+        shutil.copytree(run, folder, ignore=shutil.ignore_patterns("*.npz", "config.yaml"))
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
-    assert {"folder": "is a folder", "without radars": "without frames"}.get(kind, "not a run folder") in err
+    assert {"folder": "is a folder", "without radars": "without frames", "without config": "config.yaml"}.get(
+        kind, "not a run folder"
+    ) in err
 
 
 def test_runs_without_a_scene_have_a_page_too(run: Path, tmp_path: Path) -> None:

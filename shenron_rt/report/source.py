@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,7 @@ from ..config.profile import RadarProfile
 from ..config.scene import Scene, load_scene
 from ..constants import DEFAULT_MOUNT_XYZ
 from ..dsp import Detections
-from ..errors import ConfigError, InputError
+from ..errors import ConfigError, InputError, NotFoundError
 from ..frames import Pose
 from ..returns import Returns
 from ..runs import load_run
@@ -114,7 +115,11 @@ def open_run(path: str | os.PathLike[str]) -> RunFiles:
     run = load_run(path)
     if not any(run.frames.values()):
         raise InputError(f"{run.root}: a run without frames; report takes folders written by run, lidar or process")
-    scene, setup = _setup(run.config)
+    try:
+        text = run.config.read_text(encoding="utf-8")
+    except OSError:
+        raise NotFoundError(f"{run.root}: not a whole run folder, its config.yaml cannot be read") from None
+    scene, setup = _setup(run.config, text)
     radars = []
     for record in run.summary["radars"]:
         name = record["name"]
@@ -122,7 +127,7 @@ def open_run(path: str | os.PathLike[str]) -> RunFiles:
             raise InputError(f"{run.config}: says nothing of radar {name!r}, which summary.json has")
         profile, mount = setup[name]
         radars.append(RadarFiles(name, profile, mount, _frames(record["frames"], run.frames[name], profile)))
-    return RunFiles(run.root, scene, run.config.read_text(encoding="utf-8"), run.summary, tuple(radars))
+    return RunFiles(run.root, scene, text, run.summary, tuple(radars))
 
 
 def _frames(records: list[Mapping[str, Any]], folders: list[Path], profile: RadarProfile) -> tuple[FrameFiles, ...]:
@@ -131,8 +136,12 @@ def _frames(records: list[Mapping[str, Any]], folders: list[Path], profile: Rada
     return tuple(FrameFiles(k, t, t + profile.frame_mid_s, folder, r) for k, t, folder, r in starts)
 
 
-def _setup(config: Path) -> tuple[Scene | None, dict[str, tuple[RadarProfile, Pose]]]:
+def _setup(config: Path, text: str) -> tuple[Scene | None, dict[str, tuple[RadarProfile, Pose]]]:
     """Return the scene, where there is one, and profile and mount of every radar by name."""
+    # a scene of many actors is slow to read: tell it by its keys, and leave the reading to its own loader
+    if re.search(r"^(lidar|process):", text, flags=re.MULTILINE) is None:
+        scene = load_scene(config)
+        return scene, {r.name: (scene.profile_of(r), r.pose) for r in scene.radars}
     data, _ = read_yaml(config)
     try:
         if "lidar" in data:
@@ -141,11 +150,8 @@ def _setup(config: Path) -> tuple[Scene | None, dict[str, tuple[RadarProfile, Po
             yaw, pitch, roll = [*turned, 0.0, 0.0, 0.0][:3]
             profiles = [RadarProfile.model_validate(p) for p in data["profiles"]]
             return None, {p.name: (p, Pose((x, y, z), (yaw, pitch, roll))) for p in profiles}
-        if "process" in data:
-            profile = RadarProfile.model_validate(data["profile"])
-            return None, {profile.name: (profile, Pose(DEFAULT_MOUNT_XYZ))}
+        profile = RadarProfile.model_validate(data["profile"])
+        return None, {profile.name: (profile, Pose(DEFAULT_MOUNT_XYZ))}
     except (KeyError, TypeError, ValueError) as error:
         first = str(error).strip().splitlines()[0]
         raise ConfigError(f"{config}: not the config of a run that this version can read ({first})") from None
-    scene = load_scene(config)
-    return scene, {r.name: (scene.profile_of(r), r.pose) for r in scene.radars}

@@ -128,10 +128,13 @@ function haloText(ctx, text, x, y, colour, halo) {
   ctx.restore();
 }
 
+const MOST_NAMES = 60;
+
 // Names beside points: right, left or higher up, where no other one stands yet; one labeller a picture.
 function labeller(ctx, right, colour, halo) {
   const taken = [];
   return (text, x, y) => {
+    if (taken.length >= MOST_NAMES) return;
     const width = ctx.measureText(text).width;
     const free = (x0, y0) => x0 >= 2 && x0 + width <= right && !taken.some((t) => Math.abs(t.y - y0) < 13 && x0 < t.x1 + 4 && x0 + width > t.x0 - 4);
     const places = [0, -13, 13, -26, 26, -39].flatMap((dy) => [[x + 9, y - 4 + dy], [x - 9 - width, y - 4 + dy]]);

@@ -47,6 +47,10 @@ let due = null;
 
 // Change the state; what has changed is drawn with the next animation frame.
 function set(changes) {
+  if ("frame" in changes) {
+    const last = about.radars[changes.radar ?? state.radar].frames.length - 1;
+    changes = { ...changes, frame: Math.min(last, Math.max(0, changes.frame)) };
+  }
   const changed = Object.keys(changes).filter((key) => state[key] !== changes[key]);
   if (!changed.length) return;
   Object.assign(state, changes);

@@ -1,8 +1,5 @@
 // The player: slider, buttons, keys, and the address that brings one back to a frame.
-function seek(frame) {
-  const last = radarNow().frames.length - 1;
-  set({ frame: Math.min(last, Math.max(0, frame)), pick: -1 });
-}
+const seek = (frame) => set({ frame, pick: -1 });
 
 let timer = null;
 function play(on) {
