@@ -17,7 +17,7 @@ _FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
     "--hide-scrollbars", "--enable-unsafe-swiftshader", "--remote-debugging-pipe",
 )  # fmt: skip
-_PATIENCE_S = 60.0
+_PATIENCE_S = 120.0
 
 
 def find_chromium() -> str | None:

@@ -59,7 +59,8 @@ function sceneLegend(ctx, radar, w, h) {
   ctx.textAlign = "left";
   ctx.textBaseline = "top";
   const ghosts = array(`${radar.prefix}.detection_ghost`).data.includes(1);
-  const marks = `● detection, larger with SNR${ghosts ? "   ■ ghost" : ""}   × truth${state.tracks ? "   - - path" : ""}`;
+  const echoes = state.echoes && radar.echoes ? `   ▪ echo, ${fixed(radar.echoes.top_dbm - radar.echoes.span_db, 0)} (dark) to ${fixed(radar.echoes.top_dbm, 0)} dBm` : "";
+  const marks = `● detection, larger with SNR${ghosts ? "   ■ ghost" : ""}   × truth${state.tracks ? "   - - path" : ""}${echoes}`;
   haloText(ctx, marks, state.view === "top" ? 48 : 8, 8, c.muted, c.stage);
   ctx.restore();
 }
