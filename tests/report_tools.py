@@ -29,17 +29,19 @@ actors:
      velocity_mps: [4.33, 2.5, 0], yaw_rate_deg_s: 5, tag: Car, material: car_paint}
   - {id: 102, name: inside, shape: "box:1x1x1", aim: 500, xyz_m: [-20, -10, 1.5], tag: Other, material: concrete}
   - {id: 103, name: shell, shape: "box:3x3x3", aim: 500, xyz_m: [-20, -10, 1.5], tag: Other, material: concrete}
+  - {id: 104, name: saloon, shape: car, xyz_m: [35, 25, 0], ypr_deg: [40, 0, 0], velocity_mps: [5, 4, 0],
+     articulation: auto}
 point_targets:
   - {id: 900, name: post, xyz_m: [27, 12, 1], rcs_dbsm: 5}
 radars:
   - {name: front, profile: awrl1432, xyz_m: [2.0, 0, 1.0]}
   - {name: left, profile: awrl1432, xyz_m: [0.0, 1.0, 1.0], ypr_deg: [40, 0, 0]}
 """
-FRAMES = 3
+FRAMES = 5
 
 
 def street_run(folder: Path, name: str = NASTY) -> Path:
-    """Render three frames of two radars over a street, by the command line; return the run folder."""
+    """Render five frames of two radars over a street, by the command line; return the run folder."""
     scene = folder / "street.yaml"
     scene.write_text(SCENE.replace("NAME", json.dumps(name)), encoding="utf-8")
     options = ["--frames", f"0:{FRAMES}", "--rays", "2000", "--no-pictures", "--json"]

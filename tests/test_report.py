@@ -15,10 +15,11 @@ import shenron_rt as srt
 from shenron_rt.plot._style import dbm
 from shenron_rt.plot.truth import truth_of
 from shenron_rt.report.arrays import Arrays, script_json
-from shenron_rt.report.geometry import SceneMeshes, rigid_motions
+from shenron_rt.report.geometry import SceneMeshes
 from shenron_rt.report.maps import MapPools, pooled
 from shenron_rt.report.palette import diverging, sequential
-from shenron_rt.scene.world import build_world, load_bodies
+from shenron_rt.scene.bodies import load_bodies
+from shenron_rt.scene.world import build_world
 
 #: Digits of float32: half an ulp is 6e-8 of a value.
 FLOAT32 = 1.2e-7
@@ -171,26 +172,31 @@ def test_meshes_stand_where_the_world_has_them(run: Path, page: Page) -> None:
     for prefix, mount in zip(("r0", "r1"), scene.radars, strict=True):
         radar = next(r for r in page.about["radars"] if r["prefix"] == prefix)
         assert [b["id"] for b in radar["bodies"]] == [b.object_id for b in bodies]
-        assert [b["moves"] for b in radar["bodies"]] == [b.object_id == 101 for b in bodies]
+        assert [b["moves"] for b in radar["bodies"]] == [b.object_id in (101, 104) for b in bodies]
+        assert len(bodies[-1].links) > 1  # wheels turn
         for k, frame in enumerate(radar["frames"]):
             world = build_world(scene, mount, frame["mid_s"], bodies, materials)
             eye = page.arrays[f"{prefix}.radar"][k].astype(np.float64)
             for b, body in enumerate(radar["bodies"]):
-                pose = page.arrays[f"{prefix}.poses"][b, k].astype(np.float64)
                 mesh = f"m{body['mesh']}"
-                rest = page.arrays[f"{mesh}.vertices"].astype(np.float64)[page.arrays[f"{mesh}.faces"]].mean(axis=1)
-                there = rest @ pose[:9].reshape(3, 3).T + pose[9:]
-                seen = (there - eye[9:12]) @ eye[:9].reshape(3, 3)
-                rows = world.face_body == b
-                order = np.argsort(world.face_tag[rows], kind="stable")
-                placed = world.vertices[world.faces[rows]].mean(axis=1)[order]
+                corners = page.arrays[f"{mesh}.vertices"].astype(np.float64)[page.arrays[f"{mesh}.faces"]]
+                seen = np.zeros((len(corners), 3))
+                for link, _, first, count in page.about["meshes"][body["mesh"]]["runs"]:
+                    pose = page.arrays[f"{prefix}.poses"][body["pose"] + link, k].astype(np.float64)
+                    rows = slice(first, first + count)
+                    there = corners[rows].mean(axis=1) @ pose[:9].reshape(3, 3).T + pose[9:]
+                    seen[rows] = (there - eye[9:12]) @ eye[:9].reshape(3, 3)
+                mine = world.face_body == b
+                order = np.lexsort((world.face_tag[mine], world.face_link[mine]))
+                placed = world.vertices[world.faces[mine]].mean(axis=1)[order]
                 # rotations are good to 6e-8 over 50 m, and origins to half an ulp of 50 m: 2 um each
                 np.testing.assert_allclose(seen, placed, atol=2e-5)
 
 
 def test_faces_of_every_mesh_are_all_there(page: Page) -> None:
     for k, mesh in enumerate(page.about["meshes"]):
-        assert len(page.arrays[f"m{k}.faces"]) == mesh["faces"] == mesh["all_faces"] == sum(r[2] for r in mesh["runs"])
+        assert len(page.arrays[f"m{k}.faces"]) == mesh["faces"] == mesh["all_faces"] == sum(r[3] for r in mesh["runs"])
+        assert len(page.arrays[f"m{k}.edges"]) == sum(r[2] for r in mesh["edge_runs"])
         assert page.arrays[f"m{k}.faces"].max() < len(page.arrays[f"m{k}.vertices"])
         assert page.arrays[f"m{k}.edges"].max() < len(page.arrays[f"m{k}.vertices"])
 
@@ -240,15 +246,6 @@ def test_large_maps_are_pooled_until_they_fit(rng: np.random.Generator) -> None:
     assert levels["rd"].max() == pytest.approx(float(dbm(maps["range_doppler"].max())), rel=1e-6)
 
 
-@pytest.mark.parametrize("flat", [False, True])
-def test_rigid_motion_is_found_again(flat: bool, rng: np.random.Generator) -> None:
-    rest = rng.normal(size=(9, 3)) * [4, 2, 0 if flat else 1]
-    rotation = srt.Pose((0, 0, 0), (130, -40, 20)).rotation
-    found, origin = rigid_motions([rest, rest[:4]], [rest @ rotation.T + [50, -3, 1], rest[:4]])
-    np.testing.assert_allclose(found, [rotation, np.eye(3)], atol=1e-12)
-    np.testing.assert_allclose(origin, [[50, -3, 1], [0, 0, 0]], atol=1e-10)
-
-
 def test_the_smallest_faces_go_first_and_no_vertex_stays_without_one() -> None:
     plates = [
         {"shape": f"plate:{size}x{size}", "xyz_m": (20, 5 * k, 1), "tag": "Other", "material": "metal"}
@@ -259,6 +256,7 @@ def test_the_smallest_faces_go_first_and_no_vertex_stays_without_one() -> None:
     meshes = SceneMeshes.add_to(arrays, srt.Scene(static=plates), most_faces=2 * n)
     assert [m["all_faces"] for m in meshes.records] == [n, n, n]
     assert [m["faces"] for m in meshes.records] == [0, n, n]
+    assert meshes.records[0]["runs"] == []
     assert 'id="m0.edges"' in arrays.html()
 
 

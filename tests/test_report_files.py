@@ -14,6 +14,7 @@ from report_tools import FRAMES, Page, street_run
 import shenron_rt as srt
 from shenron_rt.cli import main
 from shenron_rt.errors import InputError, NotFoundError
+from shenron_rt.objects import observe_run, track
 
 
 @pytest.fixture(scope="module")
@@ -41,33 +42,42 @@ def _track_file(folder: Path, run: Path) -> Path:
 def test_tracks_are_taken_from_their_table(run: Path, tmp_path: Path) -> None:
     _track_file(tmp_path, run)
     made = Page(srt.write_report(run, tmp_path / "a.html", tracks=tmp_path))
-    (track,) = made.about["tracks"]["tracks"]
+    (track,) = made.about["tracks"]["front"]["tracks"]
     assert (track["track"], track["object_id"]) == (3, 101)
     assert [row[:2] for row in track["rows"]] == [[0, 30], [1, 31], [2, 32]]
-    assert made.about["tracks"]["figures"] == {"radar": "front", "ospa_m": 0.25}
+    assert made.about["tracks"]["front"]["figures"] == {"radar": "front", "ospa_m": 0.25}
+    assert list(made.about["tracks"]) == ["front"]
 
 
-def test_explanations_are_taken_from_their_file(run: Path, tmp_path: Path) -> None:
-    verdict = {"name": "masked", "by": "wall", "text": "masked by wall", "numbers": {"margin_db": 1.25}, "change": "x"}
-    stage = {"name": "transmit power", "gain_db": 10.0, "level": 10.0, "unit": "dBm", "note": "Pt"}
-    item = {
-        "object_id": 101,
-        "verdict": verdict,
-        "power_dbm": -101.123456,
-        "waterfall": {"stages": [stage], "closes": True},
-    }
-    frame = {"radar": "front", "frame": 1, "time_s": 0.1, "objects": [item], "detection_labels": ["direct"]}
-    file = tmp_path / "explain.json"
-    file.write_text(json.dumps({"frames": [frame], "evidence": []}), encoding="utf-8")
-    made = Page(srt.write_report(run, tmp_path / "a.html", explained=file))
-    front, left = made.about["radars"]
-    assert left["explained"] is None
-    row = [o["id"] for o in front["objects"]].index(101)
-    assert front["explained"]["has"] == [False, True, False]
-    assert front["explained"]["verdicts"][row] == [None, "masked", None]
-    shown = made.json["r0.explain.1"]["objects"]["101"]
-    assert (shown["verdict"], shown["by"], shown["power_dbm"]) == ("masked", "wall", -101.1235)
-    assert shown["stages"] == [["transmit power", 10.0, 10.0, "dBm", "Pt"]]
+def test_tracks_are_made_where_no_table_is_given(run: Path, tmp_path: Path) -> None:
+    made = Page(srt.write_report(run, tmp_path / "a.html"))
+    count = 0
+    for radar in made.about["radars"]:
+        name = radar["name"]
+        expected = track(observe_run(run, radar=name), radar=name)
+        tracks = made.about["tracks"][name]["tracks"]
+        shown = {(t["track"], row[0]): row for t in tracks for row in t["rows"]}
+        assert set(shown) == {(r.track, r.frame) for r in expected.rows}
+        for r in expected.rows:
+            assert shown[r.track, r.frame][1:3] == pytest.approx((r.x_m, r.y_m), abs=5.1e-5)  # four decimals
+        count += len(shown)
+    assert count > 0
+    assert Page(srt.write_report(run, tmp_path / "b.html", track=False)).about["tracks"] == {}
+
+
+def test_explanations_are_made_when_asked_for(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy, ignore=shutil.ignore_patterns("left"))
+    summary = json.loads((copy / "summary.json").read_text(encoding="utf-8"))
+    summary["radars"] = [summary["radars"][0] | {"frames": summary["radars"][0]["frames"][1:2]}]
+    (copy / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    made = Page(srt.write_report(copy, explain=True))
+    (told,) = srt.explain(copy).frames
+    assert told.objects
+    for item in told.objects:
+        shown = made.json["r0.explain.0"]["objects"][str(item.object_id)]
+        assert (shown["verdict"], shown["text"]) == (item.verdict.name, item.verdict.text)
+    assert made.about["tracks"] == {}  # one frame
 
 
 @pytest.mark.parametrize(

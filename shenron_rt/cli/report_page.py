@@ -23,6 +23,8 @@ def report(
     overwrite: Annotated[bool, Parameter(negative=(), help="Replace a page that is there.")] = False,
     tracks: Path | None = None,
     explained: Path | None = None,
+    track: bool = True,
+    explain: bool = False,
     json_: Json = False,
 ) -> int:
     """Write one HTML page about a run: scene, maps, points, objects over time, settings. It opens offline.
@@ -35,18 +37,24 @@ def report(
         tracks.csv, or a folder with it. Default: in the run folder, if there is one.
     explained
         explain.json, or a folder with it. Default: in the run folder, if there is one.
+    track
+        Track the detections where there is no table: needs a scene, and three frames or more.
+    explain
+        Explain every object and frame where there is no file: about half a second each.
     """
     from ..report import write_report
     from ..runs import load_run
 
     started = clock.perf_counter()
     frames = sum(len(f) for f in load_run(run).frames.values())
-    with progress(frames, "reading", quiet=json_) as step:
+    with progress(frames * (2 if explain else 1), "reading", quiet=json_) as step:
         page = write_report(
             run,
             output,
             tracks=tracks,
             explained=explained,
+            track=track,
+            explain=explain,
             overwrite=overwrite,
             progress=lambda what: step(what, advance=1),
         )

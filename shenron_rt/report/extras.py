@@ -5,16 +5,27 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, NotFoundError
 from .arrays import Arrays
-from .source import FrameFiles, RadarFiles
+from .source import FrameFiles, RadarFiles, RunFiles
 
-__all__ = ["Explained", "Tracked", "add_explained", "find_extra", "load_explained", "load_tracks"]
+__all__ = [
+    "Explained",
+    "Tracked",
+    "add_explained",
+    "find_extra",
+    "load_explained",
+    "load_tracks",
+    "made_explained",
+    "made_tracks",
+]
 
+#: Frames that a track needs at least to be confirmed.
+_LEAST_FRAMES = 3
 #: Columns of tracks.csv that a page shows, world axes [m], [m/s].
 _TRACK_COLUMNS = ("frame", "x_m", "y_m", "vx_mps", "vy_mps", "range_m", "azimuth_deg", "coasting")
 #: Of an explained object: what its row of the table shows.
@@ -24,7 +35,8 @@ _ROW = (
 )  # fmt: skip
 
 Explained = dict[tuple[str, int], Mapping[str, Any]]
-Tracked = dict[str, Any]
+#: By radar: ``tracks`` and ``figures``.
+Tracked = dict[str, dict[str, Any]]
 
 
 def find_extra(run: Path, given: Path | None, name: str) -> Path | None:
@@ -44,18 +56,15 @@ def find_extra(run: Path, given: Path | None, name: str) -> Path | None:
     return file
 
 
-def load_tracks(file: Path) -> Tracked:
-    """Return ``tracks``, each with ``track``, ``object_id`` (most frequent truth behind it) and ``rows``; ``columns``.
-
-    Beside the table ``tracks.json``, where it stands, says which radar was tracked and how well: ``figures``.
+def load_tracks(file: Path, default: str) -> Tracked:
+    """Return the tracks of a table of one radar, which ``tracks.json`` beside it names; else ``default``.
 
     Raises
     ------
     InputError
         Columns are missing or not numbers.
     """
-    rows: dict[int, list[list[float]]] = {}
-    owners: dict[int, list[int]] = {}
+    rows: list[tuple[int, int, list[float]]] = []
     with file.open(encoding="utf-8", newline="") as text:
         reader = csv.DictReader(text)
         missing = sorted({"track", "object_id", *_TRACK_COLUMNS} - set(reader.fieldnames or ()))
@@ -63,17 +72,45 @@ def load_tracks(file: Path) -> Tracked:
             raise InputError(f"{file}:1: not a table of tracks, it has no column {missing[0]!r}")
         try:
             for row in reader:
-                number = int(row["track"])
-                rows.setdefault(number, []).append([round(float(row[name]), 4) for name in _TRACK_COLUMNS])
-                owners.setdefault(number, []).append(int(row["object_id"]))
+                rows.append((int(row["track"]), int(row["object_id"]), [float(row[n]) for n in _TRACK_COLUMNS]))
         except (TypeError, ValueError) as error:
             raise InputError(f"{file}:{reader.line_num}: numbers are needed ({error})") from None
+    figures = _figures(file.with_name("tracks.json"))
+    return {str(figures.get("radar", default)): {"tracks": _tracks(rows), "figures": figures}}
+
+
+def made_tracks(source: RunFiles) -> Tracked:
+    """Track what every radar of a run has detected, as ``shenron-rt track`` does.
+
+    Runs that cannot be tracked have none: that takes three frames, the motion of a scene, and all files of a frame.
+    """
+    from ..objects import observe_run, track
+
+    found: Tracked = {}
+    for radar in source.radars:
+        names = ("detections.csv", "cube.npz", "returns.npz")
+        whole = all((f.folder / name).is_file() for f in radar.frames for name in names)
+        if source.scene is None or len(radar.frames) < _LEAST_FRAMES or not whole:
+            continue
+        tracking = track(observe_run(source.root, radar=radar.name), radar=radar.name)
+        rows = [(r.track, r.object_id, [float(getattr(r, n)) for n in _TRACK_COLUMNS]) for r in tracking.rows]
+        found[radar.name] = {"tracks": _tracks(rows), "figures": _plain(tracking.summary())}
+    return found
+
+
+def _tracks(rows: Sequence[tuple[int, int, list[float]]]) -> list[dict[str, Any]]:
+    """Return ``track``, ``object_id`` (the truth most often behind it) and ``rows`` of each track."""
     tracks = []
-    for number, values in rows.items():
-        true = [owner for owner in owners[number] if owner > 0]
+    for number in dict.fromkeys(track for track, _, _ in rows):
+        mine = [(owner, [round(v, 4) for v in values]) for track, owner, values in rows if track == number]
+        true = [owner for owner, _ in mine if owner > 0]
         owner = max(set(true), key=true.count) if true else -1
-        tracks.append({"track": number, "object_id": owner, "rows": values})
-    return {"columns": _TRACK_COLUMNS, "tracks": tracks, "figures": _figures(file.with_name("tracks.json"))}
+        tracks.append({"track": number, "object_id": owner, "rows": [values for _, values in mine]})
+    return tracks
+
+
+def _plain(figures: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in figures.items() if isinstance(v, str | int | float)}
 
 
 def _figures(file: Path) -> dict[str, Any]:
@@ -81,7 +118,7 @@ def _figures(file: Path) -> dict[str, Any]:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return {}
-    return {k: v for k, v in found.items() if isinstance(v, str | int | float)} if isinstance(found, dict) else {}
+    return _plain(found) if isinstance(found, dict) else {}
 
 
 def load_explained(file: Path) -> Explained:
@@ -93,10 +130,20 @@ def load_explained(file: Path) -> Explained:
         Not what ``explain`` writes.
     """
     try:
-        frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
-        return {(str(f["radar"]), int(f["frame"])): f for f in frames if isinstance(f["objects"], list)}
+        return _by_frame(json.loads(file.read_text(encoding="utf-8")))
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{file}: not what shenron-rt explain writes ({type(error).__name__}: {error})") from None
+
+
+def made_explained(source: RunFiles, progress: Callable[[str], object]) -> Explained:
+    """Explain every object and frame of a run, as ``shenron-rt explain`` does."""
+    from ..attribution import explain
+
+    return _by_frame(explain(source.root, progress=progress).to_dict())
+
+
+def _by_frame(found: Mapping[str, Any]) -> Explained:
+    return {(str(f["radar"]), int(f["frame"])): f for f in found["frames"] if isinstance(f["objects"], list | tuple)}
 
 
 def add_explained(

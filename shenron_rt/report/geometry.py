@@ -13,16 +13,15 @@ from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Scene
 from ..errors import ShenronError
 from ..plot.top_view import feature_edges
-from ..scene.world import Body, build_world, load_bodies
+from ..scene.bodies import Body, load_bodies
+from ..scene.world import build_world
 from .arrays import Arrays
 from .source import RadarFiles
 
-__all__ = ["Middles", "SceneMeshes", "rigid_motions"]
+__all__ = ["Middles", "SceneMeshes"]
 
-#: Edges of a mesh that a page draws.
+#: Edges of a link that a page draws.
 _MOST_EDGES = 50_000
-#: Vertices of a body that tell how it has moved.
-_ANCHORS = 64
 #: A body that moves less than this over a run stands [m].
 _STANDS_M = 1e-3
 
@@ -44,7 +43,8 @@ class SceneMeshes:
     mesh_of : tuple of int
         Mesh of the page, by body.
     records : list of dict
-        Of each mesh: ``faces`` drawn, ``all_faces``, ``runs`` ([tag, first face, faces] of faces of one tag).
+        Of each mesh: ``faces`` drawn, ``all_faces``, ``runs`` ([link, tag, first face, faces] of one link and tag),
+        ``edge_runs`` ([link, first edge, edges]).
     """
 
     scene: Scene
@@ -83,17 +83,15 @@ class SceneMeshes:
         Parameters
         ----------
         arrays : Arrays
-            Gets ``<prefix>.poses``, (bodies, frames, 12) float32: rotation (9) and origin (3) of bodies in the world,
-            and ``<prefix>.radar``, (frames, 15): those of the radar, and its velocity (3).
+            Gets ``<prefix>.poses``, (links, frames, 12) float32: rotation (9) and origin (3) of links in the world,
+            those of a body from its row ``pose`` on, and ``<prefix>.radar``, (frames, 15): those of the radar, and its
+            velocity (3).
         prefix : str
         radar : RadarFiles
         """
         mount = self.scene.radar(radar.name)
-        counts = [len(b.mesh.vertices) for b in self.bodies]
-        begin = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        anchors = [_anchors(n) for n in counts]
-        rest = [b.mesh.vertices[a] for b, a in zip(self.bodies, anchors, strict=True)]
-        poses = np.zeros((len(self.bodies), len(radar.frames), 12))
+        first = np.concatenate([[0], np.cumsum([len(b.links) for b in self.bodies])]).astype(np.int64)
+        poses = np.zeros((first[-1], len(radar.frames), 12))
         eyes = np.zeros((len(radar.frames), 15))
         middles: dict[int, list[FloatArray]] = {b.object_id: [] for b in self.bodies if b.object_id}
         for k, frame in enumerate(radar.frames):
@@ -102,21 +100,19 @@ class SceneMeshes:
             eyes[k] = np.concatenate([eye.rotation.ravel(), eye.origin, eye.velocity])
             if not self.bodies:
                 continue
-            placed = [world.vertices[start + a] for start, a in zip(begin[:-1], anchors, strict=True)]
-            rotation, origin = rigid_motions(rest, placed)
-            poses[:, k, :9] = (eye.rotation @ rotation).reshape(-1, 9)
-            poses[:, k, 9:] = origin @ eye.rotation.T + eye.origin
-            low = np.minimum.reduceat(world.vertices, begin[:-1], axis=0)
-            high = np.maximum.reduceat(world.vertices, begin[:-1], axis=0)
+            poses[:, k, :9] = (eye.rotation @ world.link_rotation).reshape(-1, 9)
+            poses[:, k, 9:] = world.link_origin @ eye.rotation.T + eye.origin
+            low = np.minimum.reduceat(world.vertices, world.vertex_start[:-1], axis=0)
+            high = np.maximum.reduceat(world.vertices, world.vertex_start[:-1], axis=0)
             for body, middle in zip(self.bodies, (low + high) / 2, strict=True):
                 if body.object_id:
                     middles[body.object_id].append(middle)
         arrays.add(f"{prefix}.poses", poses, "f4")
         arrays.add(f"{prefix}.radar", eyes, "f4")
-        moves = np.ptp(poses, axis=1).max(axis=1, initial=0.0) > _STANDS_M
+        moves = np.ptp(poses[first[:-1]], axis=1).max(axis=1, initial=0.0) > _STANDS_M
         records = [
-            {"mesh": m, "id": b.object_id, "name": b.source.name, "moves": bool(moving)}
-            for b, m, moving in zip(self.bodies, self.mesh_of, moves, strict=True)
+            {"mesh": m, "pose": int(row), "id": b.object_id, "name": b.source.name, "moves": bool(moving)}
+            for b, m, row, moving in zip(self.bodies, self.mesh_of, first[:-1], moves, strict=True)
         ]
         # several bodies of one id have no one middle
         return records, {i: np.stack(m) for i, m in middles.items() if len(m) == len(radar.frames)}
@@ -130,46 +126,27 @@ def _loaded(scene: Scene) -> tuple[tuple[Body, ...], MaterialTable]:
         return (), load_materials("automotive")
 
 
-def _anchors(count: int) -> IntArray:
-    """Return vertices that stand for all of a body: spread over its list by a prime stride, off its patterns."""
-    return np.unique(np.arange(_ANCHORS) * 7919 % count) if count > _ANCHORS else np.arange(count)
-
-
-def rigid_motions(rest: list[FloatArray], placed: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return rotation (b, 3, 3) and shift (b, 3) [m] that take the points of each body nearest to where they are.
-
-    Parameters
-    ----------
-    rest, placed : list of (n, 3) float
-        The same points of each of b bodies [m].
-
-    References
-    ----------
-    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A32 (1976) 922,
-    doi:10.1107/S0567739476001873.
-    """
-    middle = np.stack([p.mean(axis=0) for p in rest])
-    there = np.stack([p.mean(axis=0) for p in placed])
-    spread = [(p - m).T @ (q - t) for p, q, m, t in zip(rest, placed, middle, there, strict=True)]
-    u, _, vt = np.linalg.svd(np.stack(spread))
-    # a mirror image would fit a flat body as well: keep the determinant at +1
-    mirror = np.ones((len(rest), 3))
-    mirror[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    rotation = np.einsum("bji,bj,bkj->bik", vt, mirror, u)
-    return rotation, there - np.einsum("bij,bj->bi", rotation, middle)
-
-
 def _add_mesh(arrays: Arrays, k: int, body: Body, least: float) -> dict[str, Any]:
     mesh = body.mesh
     shown = np.flatnonzero(mesh.face_area >= least)
-    shown = shown[np.argsort(body.tag[shown], kind="stable")]
+    shown = shown[np.lexsort((body.tag[shown], body.face_link[shown]))]
     faces = mesh.faces[shown]
-    edges = _longest(mesh.vertices, feature_edges(mesh.vertices, mesh.faces))
-    used, row = np.unique(np.concatenate([faces.ravel(), edges.ravel()]), return_inverse=True)
+    edges = [_longest(mesh.vertices, _edges(body, link)) for link in range(len(body.links))]
+    used, row = np.unique(np.concatenate([faces.ravel(), *(e.ravel() for e in edges)]), return_inverse=True)
     arrays.add(f"m{k}.vertices", mesh.vertices[used], "f4")
     arrays.add(f"m{k}.faces", row[: faces.size].reshape(-1, 3), "u4")
     arrays.add(f"m{k}.edges", row[faces.size :].reshape(-1, 2), "u4")
-    return {"faces": len(shown), "all_faces": mesh.n_faces, "runs": _runs(body.tag[shown])}
+    return {
+        "faces": len(shown),
+        "all_faces": mesh.n_faces,
+        "runs": _runs(np.column_stack([body.face_link[shown], body.tag[shown]])),
+        "edge_runs": _runs(np.repeat(np.arange(len(edges)), [len(e) for e in edges])[:, None]),
+    }
+
+
+def _edges(body: Body, link: int) -> IntArray:
+    """Return the feature edges of one link, which never run from one that turns to one that does not."""
+    return feature_edges(body.mesh.vertices, body.mesh.faces[body.face_link == link])
 
 
 def _longest(vertices: FloatArray, edges: IntArray) -> IntArray:
@@ -180,8 +157,11 @@ def _longest(vertices: FloatArray, edges: IntArray) -> IntArray:
     return edges[np.argpartition(-length, _MOST_EDGES)[:_MOST_EDGES]]
 
 
-def _runs(tags: IntArray) -> list[list[int]]:
-    """Return [tag, first, count] of each run of equal tags."""
-    first = np.flatnonzero(np.diff(tags.astype(np.int64), prepend=-1))
-    count = np.diff(first, append=len(tags))
-    return [[int(tags[i]), int(i), int(n)] for i, n in zip(first, count, strict=True)]
+def _runs(keys: IntArray) -> list[list[int]]:
+    """Return [key ..., first, count] of each run of equal (n, k) rows."""
+    if not len(keys):
+        return []
+    new = np.any(np.diff(keys.astype(np.int64), axis=0) != 0, axis=1)
+    first = np.concatenate([[0], np.flatnonzero(new) + 1])
+    count = np.diff(first, append=len(keys))
+    return [[*map(int, keys[i]), int(i), int(n)] for i, n in zip(first, count, strict=True)]

@@ -13,7 +13,16 @@ from typing import IO, Any
 from ..errors import InputError
 from ..io.npz import atomic_write
 from .arrays import Arrays, script_json
-from .extras import Explained, Tracked, add_explained, find_extra, load_explained, load_tracks
+from .extras import (
+    Explained,
+    Tracked,
+    add_explained,
+    find_extra,
+    load_explained,
+    load_tracks,
+    made_explained,
+    made_tracks,
+)
 from .gather import Limits, radar_record
 from .geometry import SceneMeshes
 from .palette import diverging, sequential
@@ -42,6 +51,8 @@ def write_report(
     *,
     tracks: str | os.PathLike[str] | None = None,
     explained: str | os.PathLike[str] | None = None,
+    track: bool = True,
+    explain: bool = False,
     overwrite: bool = False,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
@@ -57,6 +68,10 @@ def write_report(
         ``tracks.csv`` of ``shenron-rt track``, or a folder with it. Default: in the run folder, if there is one.
     explained : path, optional
         ``explain.json`` of ``shenron-rt explain``, or a folder with it. Default: in the run folder, if there is one.
+    track : bool
+        Track the detections where no table is given, the run has a scene, three frames or more, and all their files.
+    explain : bool
+        Explain every object and frame where no file is given: about half a second each.
     overwrite : bool
         Replace a page that is there.
     progress : callable, optional
@@ -85,9 +100,18 @@ def write_report(
     check_page(target, overwrite)
     track_file = find_extra(source.root, None if tracks is None else Path(tracks), "tracks.csv")
     explain_file = find_extra(source.root, None if explained is None else Path(explained), "explain.json")
-    told: Explained = {} if explain_file is None else load_explained(explain_file)
-    followed: Tracked = {} if track_file is None else load_tracks(track_file)
-    text = _page(source, followed, told, progress or (lambda _: None))
+    step = progress or (lambda _: None)
+    told: Explained = {}
+    if explain_file is not None:
+        told = load_explained(explain_file)
+    elif explain:
+        told = made_explained(source, step)
+    followed: Tracked = {}
+    if track_file is not None:
+        followed = load_tracks(track_file, source.radars[0].name)
+    elif track:
+        followed = made_tracks(source)
+    text = _page(source, followed, told, step)
 
     def write(file: IO[bytes]) -> None:
         file.write(text.encode("utf-8"))

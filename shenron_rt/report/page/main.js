@@ -48,7 +48,6 @@ function start() {
   });
   Object.assign(state, fromAddress());
   if (state.object === null) state.object = firstObject();
-  introduce();
   addEventListener("hashchange", () => set(fromAddress()));
   applyScheme("auto");
   document.addEventListener("DOMContentLoaded", () => redraw()); // by then the arrays after this script are there

@@ -48,16 +48,16 @@ function openGpu() {
   return { gl, program, place, position, meshes };
 }
 
-const poseOf = (radar, body, frame) => {
+const poseOf = (radar, row, frame) => {
   const poses = array(`${radar.prefix}.poses`);
-  const from = (body * poses.shape[1] + frame) * 12;
+  const from = (row * poses.shape[1] + frame) * 12;
   return poses.data.subarray(from, from + 12);
 };
 const eyeOf = (radar, frame) => array(`${radar.prefix}.radar`).data.subarray(frame * 15, frame * 15 + 12);
 
-// From the frame of a body to that of the radar.
-function modelMatrix(radar, body, frame) {
-  return multiply(inverseRigid(eyeOf(radar, frame)), rigid(poseOf(radar, body, frame)));
+// From the frame of a link of a body to that of the radar.
+function modelMatrix(radar, body, link, frame) {
+  return multiply(inverseRigid(eyeOf(radar, frame)), rigid(poseOf(radar, body.pose + link, frame)));
 }
 
 function sizeLike(canvas) {
@@ -91,15 +91,16 @@ function paintMeshes(clip) {
   gl.uniformMatrix4fv(place.clip, false, new Float32Array(clip));
   gl.enableVertexAttribArray(position);
   const edge = rgb(darkNow() ? "#6d7f90" : "#7b8794");
-  radar.bodies.forEach((body, b) => {
+  for (const body of radar.bodies) {
     const mesh = meshes[body.mesh];
-    gl.uniformMatrix4fv(place.model, false, new Float32Array(modelMatrix(radar, b, state.frame)));
+    const moveTo = (link) => gl.uniformMatrix4fv(place.model, false, new Float32Array(modelMatrix(radar, body, link, state.frame)));
     gl.bindBuffer(gl.ARRAY_BUFFER, mesh.vertices);
     gl.vertexAttribPointer(position, 3, gl.FLOAT, false, 0, 0);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.faces);
     gl.uniform1f(place.lit, 1);
     const chosen = body.id > 0 && body.id === state.object;
-    for (const [tag, first, count] of mesh.runs) {
+    for (const [link, tag, first, count] of mesh.runs) {
+      moveTo(link);
       const own = surfaceColour(tag);
       const tint = chosen ? rgb(objectColour(radar, body.id)).map((v, i) => 0.45 * v + 0.55 * own[i]) : own;
       gl.uniform4f(place.colour, ...tint, 1);
@@ -108,8 +109,11 @@ function paintMeshes(clip) {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.edges);
     gl.uniform1f(place.lit, 0);
     gl.uniform4f(place.colour, ...edge, Math.min(1, Math.max(0.18, 2 * FEW_EDGES / (mesh.edgeCount + 1))));
-    gl.drawElements(gl.LINES, mesh.edgeCount, gl.UNSIGNED_INT, 0);
-  });
+    for (const [link, first, count] of mesh.edge_runs) {
+      moveTo(link);
+      gl.drawElements(gl.LINES, 2 * count, gl.UNSIGNED_INT, 8 * first);
+    }
+  }
 }
 
 // Without WebGL: every edge, near the picture or not; hidden ones too.
@@ -119,19 +123,21 @@ function paintEdges(canvas, clip, radar, ratio) {
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   ctx.clearRect(0, 0, w, h);
   ctx.lineWidth = 0.8;
-  radar.bodies.forEach((body, b) => {
-    const m = multiply(clip, modelMatrix(radar, b, state.frame));
+  for (const body of radar.bodies) {
     const v = array(`m${body.mesh}.vertices`).data, e = array(`m${body.mesh}.edges`).data;
     const chosen = body.id > 0 && body.id === state.object;
     ctx.strokeStyle = chosen ? objectColour(radar, body.id) : darkNow() ? "#5d6f80" : "#8b97a4";
     ctx.beginPath();
-    for (let i = 0; i < e.length; i += 2) {
-      const p = projected(m, w, h, v[3 * e[i]], v[3 * e[i] + 1], v[3 * e[i] + 2]);
-      const q = projected(m, w, h, v[3 * e[i + 1]], v[3 * e[i + 1] + 1], v[3 * e[i + 1] + 2]);
-      if (!p || !q) continue;
-      ctx.moveTo(p[0], p[1]);
-      ctx.lineTo(q[0], q[1]);
+    for (const [link, first, count] of about.meshes[body.mesh].edge_runs) {
+      const m = multiply(clip, modelMatrix(radar, body, link, state.frame));
+      const at = (k) => projected(m, w, h, v[3 * e[k]], v[3 * e[k] + 1], v[3 * e[k] + 2]);
+      for (let i = 2 * first; i < 2 * (first + count); i += 2) {
+        const p = at(i), q = at(i + 1);
+        if (!p || !q) continue;
+        ctx.moveTo(p[0], p[1]);
+        ctx.lineTo(q[0], q[1]);
+      }
     }
     ctx.stroke();
-  });
+  }
 }

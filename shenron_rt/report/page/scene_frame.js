@@ -116,8 +116,5 @@ sceneCanvas.addEventListener("keydown", (event) => {
   else moved();
 });
 
-function tracksOf(radar) {
-  const known = about.tracks.tracks || [];
-  const whose = about.tracks.figures && about.tracks.figures.radar;
-  return whose && whose !== radar.name && about.radars.length > 1 ? [] : known;
-}
+// Tracks of a radar; rows are frame, x, y, vx, vy in the world, range [m], azimuth [deg], coasting.
+const tracksOf = (radar) => (about.tracks[radar.name] ? about.tracks[radar.name].tracks : []);

@@ -102,9 +102,10 @@ painters.push((what) => {
     ...profile.given.map(([key, value, source]) => el("tr", {}, el("td", {}, key), el("td", { class: "n" }, value), el("td", {}, source)))));
 });
 
-function introduce() {
+painters.push((what) => {
+  if (!changedAny(what, "radar")) return;
   const s = about.summary;
-  const figures = about.tracks.figures || {};
+  const { figures } = about.tracks[radarNow().name] || { figures: {} };
   const chips = [
     ["run", about.folder], ["frames", radarNow().frames.length], ["echo model", s.model], ["rays", s.rays], ["bounces", s.max_bounces],
     ["seed", s.seed], ["backend", s.backend], ["shenron_rt", s.version],
@@ -114,4 +115,4 @@ function introduce() {
   byId("chips").replaceChildren(...chips.map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", {}, value))));
   byId("description").textContent = about.description;
   byId("config").textContent = about.config;
-}
+});
