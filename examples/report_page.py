@@ -39,7 +39,9 @@ def picture(page: Path, target: Path) -> None:
             [*command, f"--window-size={SIZE[0]},{SIZE[1]}", where], check=True, capture_output=True, timeout=120
         )
         with Image.open(shot) as image:
-            image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+            image.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(
+                target, optimize=True
+            )
     print(f"{target}: {target.stat().st_size / 1e3:.0f} kB")
 
 

@@ -6,16 +6,17 @@ const VERDICT_COLOURS = {
   detected: "#2f9e6e", "below noise": "#9aa5b1", masked: "#d9822b", "outside the beam": "#7b68c8",
   "ambiguous in Doppler": "#c2479b", occluded: "#5a6b7b", "specular away": "#4b8fd0", blanked: "#6f5b4b", absent: "#cfd6de",
 };
-const MISSED = "missed", UNKNOWN = "";
+const MISSED = "missed", SILENT = "no echo", UNKNOWN = "";
 
 // What became of an object in a frame: the verdict of explain, else whether it was detected.
 function verdictOf(radar, object, frame) {
   const told = radar.explained && radar.explained.verdicts[object][frame];
   if (told) return told;
   const seen = truthValue(radar, object, "detected", frame);
+  if (seen === 0 && !Number.isFinite(truthValue(radar, object, "power_dbm", frame))) return SILENT;
   return seen === 1 ? "detected" : seen === 0 ? MISSED : UNKNOWN;
 }
-const verdictColour = (name) => (name === MISSED ? "#d05a4e" : VERDICT_COLOURS[name] || ink().grid);
+const verdictColour = (name) => (name === MISSED ? "#d05a4e" : name === SILENT ? "#aab4be" : VERDICT_COLOURS[name] || ink().grid);
 
 painters.push((what) => {
   if (!changedAny(what, "radar", "frame", "object")) return;
@@ -156,7 +157,7 @@ function chartFrame(ctx, box, xs, ys, chart, n, now, error) {
   if (Number.isFinite(error)) {
     ctx.fillStyle = c.muted;
     ctx.textAlign = "right";
-    ctx.fillText(`rms off truth ${fixed(error)}`, box.x + box.w, box.y - 6);
+    ctx.fillText(`rms off truth ${Number(error.toPrecision(2))}`, box.x + box.w, box.y - 6);
   }
   ctx.strokeStyle = c.accent;
   ctx.lineWidth = 1.2;

@@ -83,7 +83,7 @@ painters.push((what) => {
   ctx.drawImage(fanImage, box.x, box.y, box.w, box.h);
   fanRings(ctx, reach, side, xs, ys);
   const polar = (r, az) => [xs(r * Math.sin(az)), ys(r * Math.cos(az))];
-  mapMarks(ctx, radar, (d) => polar(d.range, d.azimuth), (t) => polar(t.range_m, (t.azimuth_deg * Math.PI) / 180), box.x + box.w);
+  mapMarks(ctx, radar, (d) => polar(d.range, d.azimuth), (t) => (t.range_m > reach ? [NaN, NaN] : polar(t.range_m, (t.azimuth_deg * Math.PI) / 180)), box.x + box.w);
   axes(ctx, box, xs, ys, { x: "left  ←  y [m]  →  right", y: "x forward [m]" });
   const [low, high] = mapWindow(radar.maps.ra);
   const bar = { x: width - 64, y: box.y, w: 10, h: box.h };

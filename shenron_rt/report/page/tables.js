@@ -40,11 +40,11 @@ painters.push((what) => {
     const why = told && told.objects[String(t.id)];
     const verdict = verdictOf(radar, t.index, state.frame);
     const good = verdict === "detected";
-    const words = why ? [why.verdict, why.by && `by ${why.by}`].filter(Boolean).join(" ") : { detected: "detected", missed: "not detected" }[verdict] || "–";
+    const words = why ? [why.verdict, why.by && `by ${why.by}`].filter(Boolean).join(" ") : { detected: "detected", missed: "not detected", [SILENT]: SILENT }[verdict] || "–";
     return choosable(t.id === state.object, () => set({ object: t.id, pick: -1 }),
       el("td", { class: "name" }, dot(objectColour(radar, t.id)), t.name), el("td", {}, t.tag || "–"),
       number(t.range_m), number(t.azimuth_deg, 1), number(t.velocity_mps), number(t.power_dbm, 1), number(t.snr_db, 1),
-      el("td", { class: good ? "yes" : verdict ? "no" : null }, words));
+      el("td", { class: good ? "yes" : verdict && verdict !== SILENT ? "no" : null }, words));
   });
   const columns = [["object"], ["tag"], ["range [m]", 1], ["azimuth [°]", 1], ["range rate [m/s]", 1], ["power [dBm]", 1], ["SNR [dB]", 1], [radar.explained ? "verdict" : "seen"]];
   fill("objects", head(...columns), rows, "The run knows of no objects.");
