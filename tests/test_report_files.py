@@ -165,6 +165,20 @@ def test_runs_without_a_scene_have_a_page_too(run: Path, tmp_path: Path) -> None
     assert len(made.detections("r0", 0)["range"]) > 0
 
 
+def test_runs_of_lidar_frames_have_a_page_without_meshes(tmp_path: Path) -> None:
+    assert main(["cast-lidar", "braking", "-o", str(tmp_path / "cast")]) == 0
+    frame = tmp_path / "cast/frame_000000.ply"
+    options = ["--tag-table", "0.9.14", "--frame", "carla", "--sensor-pose", "0,0,2.5", "--mount", "2,0,1,10,0,0"]
+    run = tmp_path / "lidar"
+    assert main(["lidar", str(frame), "-o", str(run), "--profile", "awrl1432", "--no-pictures", *options]) == 0
+    made = Page(srt.write_report(run))
+    (radar,) = made.about["radars"]
+    assert radar["mount"] == {"xyz_m": [2, 0, 1], "ypr_deg": [10, 0, 0]}
+    assert radar["bodies"] == []
+    table = srt.Detections.from_csv(run / "radars/awrl1432/frame_000000/detections.csv").table
+    np.testing.assert_allclose(made.detections("r0", 0)["range"], table["range"], rtol=1.2e-7)
+
+
 def test_meshes_that_are_gone_are_left_out_with_a_warning(
     run: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -81,13 +81,20 @@ function rmsError(radar, index, points, chart) {
   return off.length ? Math.sqrt(off.reduce((sum, v) => sum + v * v, 0) / off.length) : NaN;
 }
 
-// All detections of an object, with their times; kept until radar or object change.
+// Scene time of each frame, or its number where the run does not say when it was.
+function timesOf(radar) {
+  const times = radar.frames.map((f) => f.mid_s);
+  const rising = times.every((t, k) => k === 0 || t > times[k - 1]);
+  return rising ? { times, label: "scene time [s]" } : { times: radar.frames.map((f) => f.frame), label: "frame" };
+}
+
+// All detections of an object; kept until radar or object change.
 function seriesOf(radar) {
   const key = `${radar.prefix} ${state.object}`;
   if (series.key === key) return series;
   const points = [];
-  radar.frames.forEach((frame, k) => {
-    for (const d of detectionsOf(radar, k)) if (d.object === state.object) points.push({ t: frame.mid_s, k, d });
+  radar.frames.forEach((_, k) => {
+    for (const d of detectionsOf(radar, k)) if (d.object === state.object) points.push({ k, d });
   });
   const index = radar.objects.findIndex((o) => o.id === state.object);
   series = { key, points, index, errors: CHARTS.map((chart) => rmsError(radar, index, points, chart)) };
@@ -99,7 +106,7 @@ painters.push((what) => {
   const { ctx, width, height } = surface("charts");
   const radar = radarNow();
   const { points, index, errors } = seriesOf(radar);
-  const times = radar.frames.map((f) => f.mid_s);
+  const { times, label } = timesOf(radar);
   const pad = times.length > 1 ? 0 : 0.5;
   byId("history-note").textContent = index < 0 ? "" : `${radar.objects[index].name}: line truth, dots detections${tracksOf(radar).length ? ", thick line track" : ""}`;
   if (index < 0) {
@@ -117,7 +124,7 @@ painters.push((what) => {
     const [low, high] = spread(values, chart.least || 2);
     const xs = scale(times[0] - pad, times[times.length - 1] + pad, box.x, box.x + box.w);
     const ys = scale(low, high, box.y + box.h, box.y);
-    chartFrame(ctx, box, xs, ys, chart, n, xs(times[state.frame]), errors[n]);
+    chartFrame(ctx, box, xs, ys, chart, n, xs(times[state.frame]), errors[n], label);
     ctx.save();
     ctx.beginPath();
     ctx.rect(box.x, box.y - 1, box.w, box.h + 2);
@@ -131,7 +138,7 @@ painters.push((what) => {
       ctx.fillStyle = objectColour(radar, state.object);
       ctx.globalAlpha = p.k === state.frame ? 1 : 0.65;
       ctx.beginPath();
-      ctx.arc(xs(p.t), ys(chart.of(p.d)), p.k === state.frame ? 4 : 2.4, 0, 2 * Math.PI);
+      ctx.arc(xs(times[p.k]), ys(chart.of(p.d)), p.k === state.frame ? 4 : 2.4, 0, 2 * Math.PI);
       ctx.fill();
     }
     ctx.restore();
@@ -147,9 +154,9 @@ function spread(values, least) {
   return [low - room, high + room];
 }
 
-function chartFrame(ctx, box, xs, ys, chart, n, now, error) {
+function chartFrame(ctx, box, xs, ys, chart, n, now, error, label) {
   const c = ink();
-  axes(ctx, box, xs, ys, { x: n > 1 ? "scene time [s]" : "", grid: true, xCount: box.w / 60, yCount: box.h / 28 });
+  axes(ctx, box, xs, ys, { x: n > 1 ? label : "", grid: true, xCount: box.w / 60, yCount: box.h / 28 });
   ctx.fillStyle = c.ink;
   ctx.textAlign = "left";
   ctx.textBaseline = "alphabetic";
@@ -197,8 +204,9 @@ byId("charts").addEventListener("click", (event) => {
   if (!hit) return;
   const t = hit.xs.back(x);
   let best = 0;
-  radarNow().frames.forEach((f, k) => {
-    if (Math.abs(f.mid_s - t) < Math.abs(radarNow().frames[best].mid_s - t)) best = k;
+  const { times } = timesOf(radarNow());
+  times.forEach((time, k) => {
+    if (Math.abs(time - t) < Math.abs(times[best] - t)) best = k;
   });
   set({ frame: best, pick: -1 });
 });

@@ -66,10 +66,10 @@ document.addEventListener("keydown", (event) => {
   const jump = Math.max(1, Math.round(radarNow().frames.length / 10));
   const keys = {
     ArrowLeft: () => seek(state.frame - 1), ArrowRight: () => seek(state.frame + 1),
-    PageDown: () => seek(state.frame - jump), PageUp: () => seek(state.frame + jump),
     Home: () => seek(0), End: () => seek(Infinity), " ": () => play(!state.playing),
     o: () => nextObject(1), O: () => nextObject(-1),
   };
+  if (target.id === "slider") Object.assign(keys, { PageDown: () => seek(state.frame - jump), PageUp: () => seek(state.frame + jump) });
   if (!keys[event.key]) return;
   event.preventDefault();
   if (event.key !== " ") play(false);
