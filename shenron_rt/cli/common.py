@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from cyclopts import Parameter
 
 from ..errors import InputError
+from ..run_setup import frame_range, override_profile
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from ..config.profile import RadarProfile
 
 __all__ = [
     "Json", "Output", "Overrides", "Overwrite", "ProfileNames", "SetOptions", "complain", "frame_range",
@@ -81,35 +80,6 @@ class Overrides:
             raise InputError(
                 f"--set scene.{next(iter(self.scene))}: {verb} has no scene; allowed: profile., processing."
             )
-
-
-def override_profile(profile: RadarProfile, overrides: Mapping[str, str]) -> RadarProfile:
-    """Return the profile with dotted keys replaced, checked as a file would be."""
-    from ..config.loader import apply_overrides, validate_model
-    from ..config.profile import RadarProfile
-
-    if not overrides:
-        return profile
-    data = apply_overrides(profile.model_dump(), overrides)
-    return validate_model(RadarProfile, data, f"profile {profile.name} with --set")
-
-
-def frame_range(text: str) -> range:
-    """Return the frames of ``A:B`` (half open), or of one number.
-
-    Raises
-    ------
-    InputError
-    """
-    first, colon, last = text.partition(":")
-    try:
-        start = int(first or 0)
-        stop = int(last) if colon else start + 1
-    except ValueError:
-        start, stop = 0, -1
-    if start < 0 or stop <= start:
-        raise InputError(f"--frames {text}: A:B with 0 <= A < B is needed, B is not included (0:10 is ten frames)")
-    return range(start, stop)
 
 
 # ---- output

@@ -14,12 +14,12 @@ from typing import cast
 
 import numpy as np
 
-from .._typing import BoolArray, FloatArray, IntArray
+from .._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from ..constants import PATTERN_FLOOR_TWO_WAY_DB
 from ..frames import rotation_matrix, spherical
 from ..physics.antenna import AntennaPattern
 
-__all__ = ["Cells", "aimed_cells", "pattern_cells", "turned"]
+__all__ = ["Cells", "UnionPattern", "aimed_cells", "lit_part", "pattern_cells", "turned"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,10 +149,32 @@ def _pattern_cells(pattern: AntennaPattern, rays: int) -> Cells:
     share = float(coarse.solid_angle[_lit(coarse, pattern, coarse.spacing)].sum() / (4 * np.pi))
     cells = _cube(max(4, round(np.sqrt(rays / (6 * share)))))
     keep = _lit(cells, pattern, cells.spacing)
+    return _kept(cells, keep)
+
+
+def _kept(cells: Cells, keep: BoolArray) -> Cells:
+    """Return some of the cells, with neighbours among themselves."""
     row = np.full(len(cells) + 1, -1, dtype=np.int32)  # the last entry answers for -1
     row[:-1][keep] = np.arange(keep.sum(), dtype=np.int32)
     neighbour = row[cells.neighbour[keep]]
     return Cells(cells.direction[keep], cells.edges[keep], cells.solid_angle[keep], cells.spacing, neighbour)
+
+
+@dataclass(frozen=True)
+class UnionPattern:
+    """The largest of several patterns in each direction."""
+
+    patterns: tuple[AntennaPattern, ...]
+
+    def __call__(self, azimuth: ArrayLike, elevation: ArrayLike) -> FloatArray:
+        """Return the one-way power relative to the peak."""
+        return cast("FloatArray", np.max([p(azimuth, elevation) for p in self.patterns], axis=0))
+
+
+def lit_part(cells: Cells, pattern: AntennaPattern) -> tuple[Cells, IntArray]:
+    """Return the cells in which a pattern reaches -40 dB two-way, and their rows in ``cells``, which are not turned."""
+    keep = _lit(cells, pattern, cells.spacing)
+    return _kept(cells, keep), np.flatnonzero(keep)
 
 
 def turned(cells: Cells, shift: FloatArray) -> Cells:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -104,14 +105,9 @@ def trace(
     parts, hits = _cast(world, caster, launches, list(aimed))
     if mount.blocked_below_deg is not None:
         hits = [_clear(launch.cells, h, mount.blocked_below_deg) for launch, h in zip(launches, hits, strict=True)]
-    rows = [
-        block
-        for launch, p, h, d in zip(launches, parts, hits, drawn, strict=True)
-        for block in _all_rows(world, launch.cells, p, h, d.result())
-    ]
+    numbers = [d.result() for d in drawn]
     points = _point_rows(scene, world, caster, time + profile.frame_mid_s)
-    rows.append(points)
-    columns: dict[str, Any] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
+    columns = _gathered(world, launches, parts, hits, numbers, points)
     bounced = None
     if max_bounces > 1:
         wavenumber = 2.0 * np.pi / profile.wavelength_m
@@ -129,6 +125,27 @@ def trace(
         backend=caster.backend,
         door="mesh",
     )
+
+
+def _gathered(
+    world: World,
+    launches: Sequence[Launch],
+    parts: Sequence[IntArray],
+    hits: Sequence[IntArray],
+    numbers: Sequence[tuple[ComplexArray, FloatArray]],
+    points: Columns,
+) -> dict[str, Any]:
+    """Return the columns of all scatterers by name: of each launch's hits that count, then of the point targets.
+
+    ``parts`` has the face that each cell of a launch hits, ``numbers`` the random numbers of each cell.
+    """
+    rows = [
+        block
+        for launch, p, h, d in zip(launches, parts, hits, numbers, strict=True)
+        for block in _all_rows(world, launch.cells, p, h, d)
+    ]
+    rows.append(points)
+    return {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
 
 
 def _aims(world: World, seed: int, frame: int, radar: str) -> dict[int, Launch]:
@@ -213,11 +230,15 @@ def _aim(world: World, body: int, seed: int, frame: int, radar: str) -> Launch |
     item = world.bodies[body]
     if item.source.aim is None:
         return None
-    stage = f"aim {item.object_id} {item.source.name}"
-    generator = frame_generator(seed, frame, radar, stage)
+    generator = _aim_generator(item, seed, frame, radar)
     points = world.vertices[world.vertex_start[body] : world.vertex_start[body + 1]]
     cells = aimed_cells(points, item.source.aim, generator.uniform(-0.5, 0.5, 2))
     return None if cells is None else Launch(cells, generator)
+
+
+def _aim_generator(item: Body, seed: int, frame: int, radar: str) -> np.random.Generator:
+    """Return the generator of a body's own rays: two numbers place their grid, then each gets its own."""
+    return frame_generator(seed, frame, radar, f"aim {item.object_id} {item.source.name}")
 
 
 def _all_rows(
