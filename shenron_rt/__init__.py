@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .attribution import Explanation as Explanation
     from .attribution import explain as explain
+    from .batch import BatchResult as BatchResult
+    from .batch import run_batch as run_batch
     from .comparison import Comparison as Comparison
     from .comparison import compare as compare
     from .config.materials import Material as Material
     from .config.materials import MaterialTable as MaterialTable
     from .config.materials import load_materials as load_materials
+    from .config.plan import BatchPlan as BatchPlan
+    from .config.plan import load_plan as load_plan
     from .config.profile import RadarProfile as RadarProfile
     from .config.profile import load_profile as load_profile
     from .config.scene import Scene as Scene
@@ -54,6 +58,8 @@ if TYPE_CHECKING:
 _HOME = {
     "AdcCube": "synthesis",
     "BackendError": "errors",
+    "BatchPlan": "config.plan",
+    "BatchResult": "batch",
     "Comparison": "comparison",
     "ConfigError": "errors",
     "Detections": "dsp",
@@ -80,12 +86,14 @@ _HOME = {
     "explain": "attribution",
     "illuminate": "returns",
     "load_materials": "config.materials",
+    "load_plan": "config.plan",
     "load_profile": "config.profile",
     "load_scene": "config.scene",
     "make_shape": "scene.shapes",
     "process": "dsp",
     "read_mesh": "scene.readers",
     "read_semantic_lidar": "lidar.read",
+    "run_batch": "batch",
     "simulate": "pipeline",
     "simulate_all": "pipeline",
     "sweep_rcs": "rcs",

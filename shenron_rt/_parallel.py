@@ -12,7 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["BLOCK", "map_blocks", "pool"]
+__all__ = ["BLOCK", "limit_threads", "map_blocks", "pool", "threads"]
 
 Result = TypeVar("Result")
 
@@ -20,11 +20,29 @@ Result = TypeVar("Result")
 BLOCK = 1 << 14
 
 
+#: 0 is no limit; see :func:`limit_threads`.
+_limit = 0
+
+
+def limit_threads(most: int) -> None:
+    """Let this process use at most so many threads, 0 for no limit; counts from before the first work on.
+
+    For several processes side by side, which would otherwise start a thread for each core, each of them.
+    """
+    global _limit
+    _limit = most
+
+
+def threads() -> int:
+    """Return how many threads this process may use: its cores, or fewer where :func:`limit_threads` says so."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(cores, _limit) if _limit else cores
+
+
 @functools.cache
 def pool() -> Executor:
     """Return the package's thread pool: one thread a core this process may use."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return ThreadPoolExecutor(max_workers=cores, thread_name_prefix="shenron-rt")
+    return ThreadPoolExecutor(max_workers=threads(), thread_name_prefix="shenron-rt")
 
 
 def map_blocks(function: Callable[[slice], Result], n: int, block: int = BLOCK) -> list[Result]:

@@ -95,10 +95,14 @@ def check_target(folder: Path, overwrite: bool) -> None:
 
 @dataclass
 class Place:
-    """Where a run is being written: ``partial`` is filled, ``folder`` is where it stands after the ``with`` block."""
+    """Where a run is being written: ``partial`` is filled, ``folder`` is where it stands after the ``with`` block.
+
+    ``known`` may hold manifest records of files that need not be read again.
+    """
 
     partial: Path
     folder: Path
+    known: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 @contextlib.contextmanager
@@ -127,7 +131,7 @@ def write_run(folder: Path, *, overwrite: bool = False, another: Callable[[], Pa
         os.umask(umask)
         place.partial.chmod(0o777 & ~umask)  # mkdtemp gives 0700, which others on the team could not read
         yield place
-        write_manifest(place.partial)
+        write_manifest(place.partial, place.known)
         while not _move_into_place(place.partial, place.folder, overwrite):
             if another is None:
                 check_target(place.folder, overwrite)
@@ -272,10 +276,15 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def write_manifest(root: Path) -> None:
-    """Write size and SHA-256 of every file below ``root``."""
-    files = sorted(p for p in root.rglob("*") if p.is_file() and p != root / _MANIFEST)
-    records = {p.relative_to(root).as_posix(): {"size": p.stat().st_size, "sha256": _sha256(p)} for p in files}
+def write_manifest(root: Path, known: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+    """Write size and SHA-256 of every file below ``root``; ``known`` has records of files that need not be read."""
+    files = {
+        p.relative_to(root).as_posix(): p for p in sorted(root.rglob("*")) if p.is_file() and p != root / _MANIFEST
+    }
+    records = {
+        name: (known or {}).get(name) or {"size": file.stat().st_size, "sha256": _sha256(file)}
+        for name, file in files.items()
+    }
     write_json(root / _MANIFEST, {"version": 1, "files": records})
 
 

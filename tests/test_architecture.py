@@ -30,7 +30,8 @@ LAYERS = (
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable", "sequence"),
-    ("runs", "run_frames"),
+    ("runs", "run_frames", "run_setup", "rendering"),
+    ("batch",),
     ("attribution", "objects"),  # read run folders
     ("plot", "report"),
     ("comparison", "export"),  # a comparison saves its figure page, an export draws maps that the run did not
@@ -49,9 +50,10 @@ ONLY_IN = {
     "xarray": {"export"},
     "zarr": {"export"},
     "rich": {"cli"},
+    "distributed": {"batch"},
 }
 #: libraries of extras, which need not be there
-OPTIONAL = {"foxglove", "rosbags", "xarray", "zarr"}
+OPTIONAL = {"distributed", "foxglove", "rosbags", "xarray", "zarr"}
 #: libraries that cost start-up time: inside functions only
 LAZY = {
     "mitsuba",

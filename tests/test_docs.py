@@ -57,7 +57,7 @@ def test_python_example_of_the_readme_runs(
 @pytest.mark.parametrize(("name", "text"), list(_snippets()))
 def test_yaml_snippets_of_the_docs_validate(name: str, text: str, tmp_path: Path) -> None:
     first = text.splitlines()[0]
-    title = re.fullmatch(r"# (?:(profiles|scenes|materials)/)?([\w.]+\.yaml)", first)
+    title = re.fullmatch(r"# (?:(profiles|scenes|materials|plans)/)?([\w.]+\.yaml)", first)
     assert title, f"{name}: the first line says which file it is, got {first!r}"
     file = tmp_path / title[2]
     file.write_text(text, encoding="utf-8")
@@ -66,7 +66,12 @@ def test_yaml_snippets_of_the_docs_validate(name: str, text: str, tmp_path: Path
 
         assert load_manifest(file).parts
         return
-    loader = {"profiles": srt.load_profile, "scenes": srt.load_scene, "materials": srt.load_materials}[title[1]]
+    loader = {
+        "profiles": srt.load_profile,
+        "scenes": srt.load_scene,
+        "materials": srt.load_materials,
+        "plans": srt.load_plan,
+    }[title[1]]
     given = yaml.safe_load(text)
     assert set(given) <= set(loader(file).model_dump(exclude_unset=True))
 

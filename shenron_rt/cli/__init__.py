@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ __all__ = ["build_app", "main"]
 
 _VERBS = {
     "run": ("run:run", "Render a mesh scene: scatterers, ADC cube, maps, detections, pictures."),
+    "batch": ("batch:batch", "Render a plan of scenes, profiles, seeds and parameters; local or on a Dask cluster."),
     "lidar": ("lidar:lidar", "Simulate a radar from frames of a semantic LiDAR: CARLA's PLY, .bin, .npy, LAZ ..."),
     "process": ("process:process", "Process ADC data: own cubes, plain .npy arrays, DCA1000 captures."),
     "rcs": ("rcs:rcs", "Sweep one target on a turntable: radar cross section over frequency and aspect."),
@@ -32,12 +34,9 @@ _VERBS = {
 
 
 def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
+    from ..run_setup import package_version
 
-    try:
-        return version("shenron-rt")
-    except PackageNotFoundError:  # a checkout on the path, not installed
-        return "0+unknown"
+    return package_version()
 
 
 def build_app() -> App:
@@ -87,11 +86,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError) as error:
         return complain(f"{error.filename}: {error.strerror}")
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            return _internal(error)
+        where = f"{error.filename}: " if error.filename else ""
+        return complain(f"{where}no space left on the disk; what was being written has been removed")
     except KeyboardInterrupt:
         return complain("interrupted", code=130)
     except Exception as error:
-        if os.environ.get("SHENRON_RT_DEBUG"):
-            raise
-        text = f"internal error: {type(error).__name__}: {error}"
-        return complain(text, hint="SHENRON_RT_DEBUG=1 shows where; please report it", code=1)
+        return _internal(error)
     return result if isinstance(result, int) else 0
+
+
+def _internal(error: Exception) -> int:
+    """Print the line of an error that is ours, or raise it again for who looks for it."""
+    from .common import complain
+
+    if os.environ.get("SHENRON_RT_DEBUG"):
+        raise error
+    text = f"internal error: {type(error).__name__}: {error}"
+    return complain(text, hint="SHENRON_RT_DEBUG=1 shows where; please report it", code=1)

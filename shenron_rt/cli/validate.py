@@ -174,6 +174,8 @@ def _yaml_checker(path: Path) -> tuple[str, Callable[[Path], str]]:
         return "tag manifest", _manifest
     if keys & {"sensor_transform", "ego_transform"} or {"axes", "actors"} <= keys:
         return "side file of a LiDAR frame", _side_file
+    if "scenes" in keys:
+        return "batch plan", _plan
     if keys & _SCENE_KEYS:
         return "scene", _scene
     raise InputError(
@@ -199,6 +201,14 @@ def _manifest(path: Path) -> str:
     from ..scene.resolver_manifest import load_manifest
 
     return f"{len(load_manifest(path).parts)} rules"
+
+
+def _plan(path: Path) -> str:
+    from ..batch import load_plan
+    from ..batch.expansion import expand
+
+    planned = expand(load_plan(path))
+    return f"{len(planned)} runs, {sum(len(r.frames) for r in planned)} frames"
 
 
 def _scene(path: Path) -> str:

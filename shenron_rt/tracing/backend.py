@@ -20,6 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from .._parallel import threads
 from ..errors import BackendError, InputError, did_you_mean
 
 __all__ = ["Backend", "BackendChoice", "Status", "backend_status", "choose_backend", "use_backend"]
@@ -158,11 +159,20 @@ def _variant(name: str) -> Iterator[Any]:
     before = mi.variant()
     if before != name:
         mi.set_variant(name)
+        _hold_to_the_threads()
     try:
         yield mi
     finally:
         if before not in (None, name):
             mi.set_variant(before)
+
+
+def _hold_to_the_threads() -> None:
+    """Let Dr.Jit use no more threads than this process may; it starts with one a core."""
+    import drjit
+
+    if drjit.thread_count() > threads():
+        drjit.set_thread_count(threads())
 
 
 @contextlib.contextmanager

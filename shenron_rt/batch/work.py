@@ -1,0 +1,114 @@
+"""One piece of work: renders a block of frames into a folder that appears whole or not at all. Runs in any process."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import threading
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from .. import runs
+from .._parallel import limit_threads
+from ..config.scene import Scene, load_scene
+from ..errors import InputError, ShenronError
+from ..rendering import rendered
+from ..run_frames import parts_of
+from ..run_setup import merge_options
+from .expansion import Unit
+
+__all__ = ["WORK", "Outcome", "failed", "is_disk_full", "render_unit", "work_folder"]
+
+#: Folder of a batch, below its root, where pieces of work wait until their run is complete.
+WORK = ".work"
+#: Mitsuba's variant and the kept scene are of the process, and a Dask worker may have several threads.
+_one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a piece of work.
+
+    Parameters
+    ----------
+    kind : str
+        ``"done"``; ``"input"``: what it was told cannot be done, now or later; ``"disk"``: no space is left, for any
+        work; ``"other"``: may go well when tried again.
+    error, detail : str
+        One line, and all that is known.
+    """
+
+    kind: Literal["done", "input", "disk", "other"]
+    error: str = ""
+    detail: str = ""
+
+
+def work_folder(root: str | Path, run: str) -> Path:
+    """Return where the pieces of a run wait, beside the configuration they are made from."""
+    return Path(root) / WORK / run
+
+
+def render_unit(unit: Unit) -> Outcome:
+    """Render a block of frames, unless it is there already; never raises, so that any error comes back in words."""
+    limit_threads(unit.threads)
+    with _one_at_a_time:
+        try:
+            _render(unit)
+        except Exception as error:
+            return failed(error)
+    return Outcome("done")
+
+
+def failed(error: BaseException) -> Outcome:
+    """Return the outcome that an error is."""
+    detail = "".join(traceback.format_exception(error)).strip()
+    if is_disk_full(error):
+        return Outcome("disk", f"no space left on the disk ({error})", detail)
+    if isinstance(error, ShenronError):
+        return Outcome("input", str(error), str(error))
+    return Outcome("other", f"{type(error).__name__}: {error}", detail)
+
+
+def is_disk_full(error: BaseException) -> bool:
+    """Tell whether an error says that the disk, or the share of it that is ours, is full."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _render(unit: Unit) -> None:
+    home = work_folder(unit.root, unit.run)
+    config = home / "config.yaml"
+    if not config.is_file():
+        raise InputError(
+            f"{config}: not seen from {os.uname().nodename}; workers need the batch folder and the files that its "
+            "scenes name under the same paths"
+        )
+    folder = home / unit.block
+    if folder.is_dir():
+        return
+    scene = _scene(config, config.stat().st_mtime_ns)
+    options = merge_options(scene.run, {})
+    keep = parts_of(unit.write)
+    names = scene.object_names()
+    records: dict[str, dict[str, Any]] = {
+        r.name: {"name": r.name, "profile": scene.profile_of(r).name, "frames": []} for r in scene.radars
+    }
+    backend = ""
+    try:
+        with runs.write_run(folder) as place:
+            for mount, frame in rendered(scene, options, range(unit.first, unit.stop)):
+                runs.write_frame(runs.frame_folder(place.partial, mount.name, frame.frame), frame, keep)
+                records[mount.name]["frames"].append(runs.frame_summary(frame, names))
+                backend = frame.backend
+            runs.write_json(place.partial / "records.json", {"backend": backend, "radars": list(records.values())})
+    except InputError:
+        if not folder.is_dir():  # else another worker was quicker with the same bytes
+            raise
+
+
+@functools.lru_cache(maxsize=2)
+def _scene(config: Path, stamp: int) -> Scene:
+    """Return the scene of a run; the same object for all its blocks, so that what was prepared for it is kept."""
+    return load_scene(config)
