@@ -16,6 +16,9 @@ __all__ = ["advise_thin"]
 
 _log = logging.getLogger(__name__)
 
+#: Objects that get a line each; of thousands in a scene the others get one together.
+_MOST = 5
+
 _advised: set[tuple[str, int]] = set()
 
 
@@ -32,6 +35,7 @@ def advise_thin(world: World, pattern: AntennaPattern, spacing: float, aimed: Co
     aimed : container of int
         Bodies that have rays of their own.
     """
+    thin: list[tuple[str, int, float, float]] = []
     for b, body in enumerate(world.bodies):
         key = (body.source.name or body.source.shape or "", body.object_id)
         points = world.vertices[world.vertex_start[b] : world.vertex_start[b + 1]]
@@ -44,10 +48,12 @@ def advise_thin(world: World, pattern: AntennaPattern, spacing: float, aimed: Co
         )  # of a plate its shorter side, of a pole its thickness
         if width < spacing * distance and pattern(azimuth, elevation) ** 2 > 10 ** (PATTERN_FLOOR_TWO_WAY_DB / 10):
             _advised.add(key)
-            _log.warning(
-                "object %r (id %d) is %.2g m thick and the rays are %.2g m apart where it stands: its echo is a matter "
-                "of chance; give it `aim: 2000` or use more rays",
-                *key,
-                width,
-                spacing * distance,
-            )
+            thin.append((*key, width, float(spacing * distance)))
+    for row in thin[:_MOST]:
+        _log.warning(
+            "object %r (id %d) is %.2g m thick and the rays are %.2g m apart where it stands: its echo is a matter "
+            "of chance; give it `aim: 2000` or use more rays",
+            *row,
+        )
+    if len(thin) > _MOST:
+        _log.warning("so it is with %d more objects, %r (id %d) the last of them", len(thin) - _MOST, *thin[-1][:2])
