@@ -265,6 +265,16 @@ def test_validate_counts_what_a_plan_will_render(tmp_path: Path, capsys: pytest.
     assert main(["validate", str(write_plan(tmp_path, seeds=[1, 1]))]) == 2
 
 
+def test_warnings_of_workers_are_told_once_by_the_driver(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    plan = write_plan(
+        tmp_path, seeds=[1, 2], options={"rays": 200, "backend": "scalar", "model": "shenron:as_released"}
+    )
+    assert main(["batch", str(plan), "-o", str(tmp_path / "out"), "--workers", "2"]) == 0
+    error = capfd.readouterr().err
+    assert error.count("not watts") == 1
+    assert sum('"warning"' in line for line in (tmp_path / "out/journal.jsonl").read_text().splitlines()) == 1
+
+
 def test_two_batches_do_not_work_in_one_folder(tmp_path: Path, inline: None) -> None:
     from shenron_rt.batch.folder import BatchFolder
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import time
 from collections import Counter, deque
@@ -21,6 +22,8 @@ from .local import LocalWorkers, cores
 from .work import Outcome
 
 __all__ = ["BatchProgress", "BatchResult", "Failure", "run_batch"]
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,7 @@ class _Driver:
     open: dict[str, int] = field(default_factory=dict)  # blocks of each run that are not done
     attempts: Counter[Unit] = field(default_factory=Counter)
     failures: list[Failure] = field(default_factory=list)
+    said: set[str] = field(default_factory=set)  # warnings, each told once
     done: int = 0
     failed: int = 0
     before: int = 0
@@ -234,6 +238,11 @@ class _Driver:
         self.attempts[unit] += 1
         frames = unit.stop - unit.first
         told: dict[str, Any] = {"run": unit.run, "frames": f"{unit.first}:{unit.stop}", "attempt": self.attempts[unit]}
+        for text in outcome.warnings:
+            if text not in self.said:
+                self.said.add(text)
+                self.folder.note("warning", run=unit.run, text=text)
+                _log.warning("%s", text)
         if outcome.kind == "done":
             self.folder.note("done", **told)
             self.done += frames

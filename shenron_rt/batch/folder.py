@@ -86,9 +86,9 @@ class BatchFolder:
             if not resume:
                 raise InputError(f"{self.root}: holds a batch; --resume goes on with it, or give another -o")
             self._hold_to(json.loads(file.read_text(encoding="utf-8")), asked)
-            self._sweep()
         elif any(not p.name.startswith(".") for p in self.root.iterdir()):  # hidden: the lock, files half written
             raise InputError(f"-o {self.root}: the folder is not empty and holds no batch; give another one")
+        self._sweep()
         _write_json(file, asked)
         text = yaml.safe_dump(plan.model_dump(mode="json", exclude_none=True), sort_keys=False, allow_unicode=True)
         _write_text(self.root / "plan.yaml", text)

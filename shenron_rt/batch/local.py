@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -81,7 +82,11 @@ class LocalWorkers:
 
 
 def _follow_the_parent() -> None:
-    """End this process when the one that started it does; it would wait for work for ever."""
+    """End this process when the one that started it does; it would wait for work for ever.
+
+    An interrupt from the keyboard goes to the whole group of processes; the driver ends its workers itself.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
 
     def watch() -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import functools
+import logging
 import os
 import threading
 import traceback
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -39,11 +42,14 @@ class Outcome:
         work; ``"other"``: may go well when tried again.
     error, detail : str
         One line, and all that is known.
+    warnings : tuple of str
+        What the package had to say.
     """
 
     kind: Literal["done", "input", "disk", "other"]
     error: str = ""
     detail: str = ""
+    warnings: tuple[str, ...] = ()
 
 
 def work_folder(root: str | Path, run: str) -> Path:
@@ -54,12 +60,31 @@ def work_folder(root: str | Path, run: str) -> Path:
 def render_unit(unit: Unit) -> Outcome:
     """Render a block of frames, unless it is there already; never raises, so that any error comes back in words."""
     limit_threads(unit.threads)
-    with _one_at_a_time:
+    with _one_at_a_time, _heard() as warnings:
         try:
             _render(unit)
+            outcome = Outcome("done")
         except Exception as error:
-            return failed(error)
-    return Outcome("done")
+            outcome = failed(error)
+    return replace(outcome, warnings=tuple(dict.fromkeys(warnings)))
+
+
+@contextlib.contextmanager
+def _heard() -> Iterator[list[str]]:
+    """Keep the warnings of the package for the driver, which has the terminal, instead of printing them here."""
+    messages: list[str] = []
+
+    class Keeping(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            messages.append(record.getMessage())
+
+    logger = logging.getLogger("shenron_rt")
+    before = logger.handlers, logger.propagate
+    logger.handlers, logger.propagate = [Keeping(logging.WARNING)], False
+    try:
+        yield messages
+    finally:
+        logger.handlers, logger.propagate = before
 
 
 def failed(error: BaseException) -> Outcome:
