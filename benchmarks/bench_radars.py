@@ -2,8 +2,8 @@
 
     python benchmarks/bench_radars.py [--rays N]
 
-The three are those of ``shenron-rt run braking --profile awrl1432 --profile radarbook --profile ti_cascade``, the one is
-awrl1432, whose pattern is the widest. Frames follow each other at 10 Hz. Both take turns, after warm-up.
+The three are those of ``shenron-rt run braking --profile awrl1432 --profile radarbook --profile ti_cascade``, the one
+is awrl1432, whose pattern is the widest. Frames follow each other at 10 Hz. Both take turns, after warm-up.
 """
 
 from __future__ import annotations
