@@ -286,9 +286,19 @@ def test_an_object_seen_only_as_its_ghost_is_not_detected() -> None:
 
 
 def test_parts_of_a_frame_with_bounces_add_up_to_its_cube() -> None:
-    frame = srt.simulate(srt.load_scene("braking"), rays=5000, accuracy=1e-3, max_bounces=3)
+    scene = srt.load_scene("braking")
+    rail = {
+        "name": "mirror",
+        "shape": "box:60x0.1x2",
+        "xyz_m": (30, 3, 1),
+        "material": "metal",
+        "tag": "Walls",
+        "id": 50,
+    }
+    scene = srt.Scene.model_validate(scene.model_dump() | {"static": [*scene.model_dump()["static"], rail]})
+    frame = srt.simulate(scene, rays=5000, accuracy=1e-3, max_bounces=3)
     parts = Contributions(frame.returns, frame.cube, accuracy=1e-8)
-    assert max(parts.ids) > GHOST  # the car is seen in the walls, too
+    assert max(parts.ids) > GHOST  # the car is seen in the metal, too
     whole = srt.synthesize(frame.returns, frame.profile, noise=None, accuracy=1e-8)
     total = sum(parts.samples(i).data for i in parts.ids)
     assert np.sqrt(np.mean(np.abs(total - whole.data) ** 2)) < 1e-6 * np.sqrt(np.mean(np.abs(whole.data) ** 2))

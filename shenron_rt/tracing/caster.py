@@ -95,7 +95,8 @@ class RayCaster:
         # arrays of length 1 and not literals: another place of the eye must not need another kernel
         start = mi.Point3f(0, 0, 0) if o is None else mi.Point3f(*vectors(o))
         ray = mi.Ray3f(start, mi.Vector3f(*vectors(d)))
-        hit = self._scene.ray_intersect_preliminary(ray, coherent=o is None or o.shape[1] == 1)
+        # never coherent: Embree's packets of rays from one eye miss faces where the rays between were left out
+        hit = self._scene.ray_intersect_preliminary(ray)
         prim = dr.select(hit.is_valid(), mi.Int(hit.prim_index), mi.Int(-1))
         return np.asarray(prim.numpy(), dtype=np.int32)
 
@@ -103,11 +104,10 @@ class RayCaster:
         cast, Ray, Point = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f
         starts: Iterable[Any]
         if o is None or o.shape[1] == 1:
-            start = Point(0, 0, 0) if o is None else Point(o[:, 0].tolist())
-            starts, together = itertools.repeat(start), True
+            starts = itertools.repeat(Point(0, 0, 0) if o is None else Point(o[:, 0].tolist()))
         else:
-            starts, together = map(Point, o.T.tolist()), False
-        hits = (cast(Ray(start, direction), together) for start, direction in zip(starts, d.T.tolist(), strict=False))
+            starts = map(Point, o.T.tolist())
+        hits = (cast(Ray(start, direction)) for start, direction in zip(starts, d.T.tolist(), strict=False))
         return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int32, d.shape[1])
 
 
