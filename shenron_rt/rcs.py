@@ -29,7 +29,7 @@ FLOOR_DBSM = -120.0
 DEFAULT_RAYS_PER_WAVELENGTH = 1.0
 #: How often cells that no tube and no clean cut fills may be quartered, by the widest target in cells of the lattice:
 #: a corner is worth it, and costs little; a car has so many that the rest of their cells average out.
-_LEVELS = ((160.0, 6), (320.0, 2), (700.0, 1), (math.inf, 0))
+_LEVELS = ((160.0, 5), (320.0, 2), (700.0, 1), (math.inf, 0))
 MOST_BOUNCES = 10
 #: Fields of a sweep that stay arrays when they are loaded.
 _ARRAYS = ("amplitude", "frequency_hz", "elevation_deg", "azimuth_deg")

@@ -129,6 +129,7 @@ def test_spread_of_drawn_levels_is_found() -> None:
     assert circle.lobe("side") == pytest.approx(levels.published_lobe("vehicle", "side"), abs=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ghz", cases.BANDS_GHZ)
 def test_pole_over_distance_follows_its_surface_integral(ghz: float) -> None:
     curve = RESULTS[f"distance-pole-{ghz:g}"]

@@ -22,8 +22,8 @@ from .views import Views
 
 __all__ = ["Echoes", "Pieces", "Rim"]
 
-#: Halvings of the side of a cell to find where an edge crosses it: a clean one, to 1/2048 of the side, and others.
-HALVINGS, ROUGH_HALVINGS = 10, 5
+#: Halvings of the side of a cell to find where an edge crosses it: a clean one, to 1/512 of the side, and others.
+HALVINGS, ROUGH_HALVINGS = 8, 5
 #: How far an edge may run from the straight line between two cuts, in sides of the cell.
 _TOLERANCE = 1.0 / 256.0
 _PLACE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -164,6 +164,8 @@ class _Sum:
         last = self._is_last(cells, pending)
         cut, left = [], cells.select(pending[:0])
         for rows, all_of_them in ((pending[~last], False), (pending[last], True)):
+            if not len(rows) and cut:
+                continue
             rim = Rim(surface, self.lit, chain, most, monostatic, self.lattice, cells.select(rows), corner[rows])
             pieces, uncut = rim.cut(shortest, all_of_them)
             cut.append(pieces)
