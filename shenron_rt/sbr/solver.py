@@ -162,7 +162,8 @@ class _Sum:
         shortest = SPEED_OF_LIGHT / float(self.frequency_hz.max())
         found, pending = self._sort(chain, cells, corner, shortest)
         last = self._is_last(cells, pending)
-        cut, left = [], cells.select(pending[:0])
+        left = cells.select(pending[:0])
+        cut: list[Pieces] = []
         for rows, all_of_them in ((pending[~last], False), (pending[last], True)):
             if not len(rows) and cut:
                 continue

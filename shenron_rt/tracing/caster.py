@@ -63,7 +63,9 @@ class RayCaster:
             self._parameters["world.vertex_positions"] = _flat(vertices)
             self._parameters.update()
 
-    def cast(self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None) -> IntArray:
+    def cast(
+        self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None, *, coherent: bool = False
+    ) -> IntArray:
         """Return (n,) int32 row of the nearest face along each direction, -1 where nothing is hit.
 
         Parameters
@@ -72,6 +74,9 @@ class RayCaster:
             Unit vectors, component by component.
         origins : (3, n) or (3, 1) float32, optional
             Where each ray starts, or all do; default: at the origin [m].
+        coherent : bool
+            Whether neighbours in the list are neighbours in space, without gaps: takes half the time. Embree misses
+            faces where they are not.
         """
         n = directions.shape[1]
         RayCaster.rays_cast += n
@@ -83,10 +88,10 @@ class RayCaster:
             for i in range(0, n, _BLOCK):
                 part = slice(i, i + _BLOCK)
                 start = origins if origins is None or origins.shape[1] == 1 else origins[:, part]
-                blocks.append(run(mi, directions[:, part], start))
+                blocks.append(run(mi, directions[:, part], start, coherent))
         return np.concatenate(blocks)
 
-    def _at_once(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> IntArray:
+    def _at_once(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None, coherent: bool) -> IntArray:
         import drjit as dr
 
         def vectors(rows: NDArray[np.float32]) -> Any:
@@ -95,19 +100,18 @@ class RayCaster:
         # arrays of length 1 and not literals: another place of the eye must not need another kernel
         start = mi.Point3f(0, 0, 0) if o is None else mi.Point3f(*vectors(o))
         ray = mi.Ray3f(start, mi.Vector3f(*vectors(d)))
-        # never coherent: Embree's packets of rays from one eye miss faces where the rays between were left out
-        hit = self._scene.ray_intersect_preliminary(ray)
+        hit = self._scene.ray_intersect_preliminary(ray, coherent=coherent)
         prim = dr.select(hit.is_valid(), mi.Int(hit.prim_index), mi.Int(-1))
         return np.asarray(prim.numpy(), dtype=np.int32)
 
-    def _one_by_one(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None) -> IntArray:
+    def _one_by_one(self, mi: Any, d: NDArray[np.float32], o: NDArray[np.float32] | None, coherent: bool) -> IntArray:
         cast, Ray, Point = self._scene.ray_intersect_preliminary, mi.Ray3f, mi.Point3f
         starts: Iterable[Any]
         if o is None or o.shape[1] == 1:
             starts = itertools.repeat(Point(0, 0, 0) if o is None else Point(o[:, 0].tolist()))
         else:
             starts = map(Point, o.T.tolist())
-        hits = (cast(Ray(start, direction)) for start, direction in zip(starts, d.T.tolist(), strict=False))
+        hits = (cast(Ray(start, direction), coherent) for start, direction in zip(starts, d.T.tolist(), strict=False))
         return np.fromiter((h.prim_index if h.is_valid() else -1 for h in hits), np.int32, d.shape[1])
 
 

@@ -157,7 +157,7 @@ def _cast(
     world: World, caster: WorldCaster, launches: list[Launch], aimed: list[int]
 ) -> tuple[list[IntArray], list[IntArray]]:
     """Return the face that each cell of each launch hits, and the cells that count; the first launch is the grid."""
-    face = caster.cast(launch_directions(launches))
+    face = caster.cast(launch_directions(launches), coherent=True)
     parts = np.split(face, np.cumsum([len(launch.cells) for launch in launches])[:-1])
     # An aimed object is seen by its own rays alone, everything else by the common grid alone: neither depends on
     # what else there is, and no solid angle of an object counts twice.

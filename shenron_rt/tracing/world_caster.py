@@ -97,7 +97,9 @@ class WorldCaster:
         self._world = world
         self._loose.move(world.vertices[self._loose_vertices])
 
-    def cast(self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None) -> IntArray:
+    def cast(
+        self, directions: NDArray[np.float32], origins: NDArray[np.float32] | None = None, *, coherent: bool = False
+    ) -> IntArray:
         """Return (n,) int32 row of the nearest face along each direction, -1 where nothing is hit.
 
         Parameters
@@ -106,6 +108,8 @@ class WorldCaster:
             Unit vectors, frame of the radar, component by component.
         origins : (3, n) float32, optional
             Where each ray starts; default: at the radar [m].
+        coherent : bool
+            Whether neighbours in the list are neighbours in space; see :meth:`RayCaster.cast`.
         """
         nearest = self._loose_rows[self._loose.cast(directions, origins)]
         for rigid in self._rigid:
@@ -113,7 +117,7 @@ class WorldCaster:
             rays = _towards(rigid, rotation, shift, directions, origins)
             d, o = (directions, origins) if rays is None else (directions[:, rays], _columns(origins, rays))
             start = shift[:, None] if o is None else _turned(rotation, o) + shift[:, None]
-            hit = rigid.rows[rigid.caster.cast(_turned(rotation, d), start)]
+            hit = rigid.rows[rigid.caster.cast(_turned(rotation, d), start, coherent=coherent and rays is None)]
             self._merge(nearest, hit, rays, directions, origins)
         return nearest
 
