@@ -91,7 +91,7 @@ class Surface:
         """1 or -1, the sign that turns ``normal`` outwards, where the body is closed and convex; 0 where it is not."""
         a, b = self.mesh.adjacent
         n, normal = self.mesh.n_faces, self.normal
-        if 2 * len(a) != 3 * n or not _one_piece(a, b, n):
+        if 2 * len(a) != 3 * n or _connected(a, b, n).any():
             return 0
         middle = self.mesh.vertices[self.mesh.faces].mean(axis=1)
         bend = np.concatenate([_dot(normal[a], middle[b] - middle[a]), _dot(normal[b], middle[a] - middle[b])])
@@ -141,13 +141,13 @@ def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
-def _one_piece(a: IntArray, b: IntArray, n: int) -> bool:
-    """Return whether n faces that meet in pairs hang together."""
+def _connected(a: IntArray, b: IntArray, n: int) -> IntArray:
+    """Return (n,) numbers, equal for faces that hang together by the pairs a, b."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
-    return bool(connected_components(graph, directed=False)[0] == 1)
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:
@@ -159,12 +159,7 @@ def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:
     reflector : (f,) int
         Faces that reflect differently are never in one group.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     a, b = mesh.adjacent
     bend = np.abs(np.einsum("ij,ij->i", mesh.face_normal[a], mesh.face_normal[b]))
     joined = (bend >= np.cos(SMOOTH_ANGLE)) & (reflector[a] == reflector[b])
-    ones = np.ones(int(joined.sum()), dtype=np.int8)
-    graph = coo_array((ones, (a[joined], b[joined])), shape=(mesh.n_faces, mesh.n_faces))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return _connected(a[joined], b[joined], mesh.n_faces)
