@@ -31,10 +31,10 @@ def test_three_radars_at_one_place_cast_rays_once_a_frame(braking: srt.Scene, mo
     cast: list[int] = []
     real = RayCaster.cast
 
-    def counting(self: RayCaster, directions: Any, origins: Any = None) -> Any:
+    def counting(self: RayCaster, directions: Any, origins: Any = None, **options: Any) -> Any:
         if directions.shape[1]:  # point targets are looked for, too; there are none
             cast.append(directions.shape[1])
-        return real(self, directions, origins)
+        return real(self, directions, origins, **options)
 
     monkeypatch.setattr(RayCaster, "cast", counting)
     found = trace_shared(braking, [r.name for r in braking.radars], rays=RAYS, backend="scalar")
