@@ -191,7 +191,7 @@ def test_a_plan_is_printed_and_nothing_else_happens(capsys: pytest.CaptureFixtur
 
 
 def test_a_run_that_would_take_too_long_is_refused_unless_it_is_meant(capsys: pytest.CaptureFixture[str]) -> None:
-    long = (*PLATE, "--az", "-40:40:1", "--max-seconds", "1e-3", "--no-pictures")
+    long = (*PLATE, "--az", "-40:40:1", "--max-seconds", "1e-6", "--no-pictures")
     assert "coarser step" in _refused(capsys, *long)
     assert main([*long, "--yes"]) == 0
 

@@ -102,15 +102,14 @@ class Cells:
         corner : (n, 4) int
             Points of every cell, in order around it.
         """
-        ij = (self.ij[:, None, :] + _CORNERS).reshape(-1, 2)
-        low = ij.min(axis=0, initial=0)
-        width, height = (ij.max(axis=0, initial=0) - low + 1).tolist()
-        view = np.repeat(self.view, 4)
-        key = (view.astype(np.int64) * height + (ij[:, 1] - low[1])) * width + (ij[:, 0] - low[0])
-        points, corner = _distinct(key)
+        column, row = self.ij.T
+        left, lowest = int(column.min(initial=0)), int(row.min(initial=0))
+        width, height = int(column.max(initial=0)) - left + 2, int(row.max(initial=0)) - lowest + 2
+        key = (self.view.astype(np.int64) * height + (row - lowest)) * width + (column - left)
+        points, corner = _distinct((key[:, None] + (_CORNERS[:, 0] + width * _CORNERS[:, 1])).ravel())
         where, column = np.divmod(points, width)
         number, row = np.divmod(where, height)
-        return number, np.stack([column + low[0], row + low[1]], axis=1), corner.reshape(-1, 4)
+        return number, np.stack([column + left, row + lowest], axis=1), corner.reshape(-1, 4)
 
 
 def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[Lattice, IntArray]:
@@ -130,20 +129,19 @@ def covering(surface: Surface, lit: Views, step: float, seed: int) -> tuple[Latt
     counts : (a, 2) int
         Columns and rows.
     """
-    mesh = surface.mesh
-    points = mesh.vertices[np.unique(mesh.faces)] - surface.centre
-    x, y = points @ lit.horizontal.T, points @ lit.vertical.T
+    points = surface.points
+    x, y = lit.horizontal @ points.T, lit.vertical @ points.T
     if lit.distance is not None:
         # onto the plane through the centre, along rays from the radar
         ahead = lit.toward @ surface.centre
-        away = points @ lit.toward.T
-        scale = (lit.distance - ahead) / np.maximum(lit.distance - ahead - away, 1e-9)
-        side = np.stack([lit.horizontal @ surface.centre, lit.vertical @ surface.centre])
-        x, y = (x + side[0]) * scale - side[0], (y + side[1]) * scale - side[1]
-    low, high = np.stack([x.min(axis=0), y.min(axis=0)], axis=1), np.stack([x.max(axis=0), y.max(axis=0)], axis=1)
+        away = lit.toward @ points.T
+        scale = (lit.distance - ahead)[:, None] / np.maximum((lit.distance - ahead)[:, None] - away, 1e-9)
+        right, up = (lit.horizontal @ surface.centre)[:, None], (lit.vertical @ surface.centre)[:, None]
+        x, y = (x + right) * scale - right, (y + up) * scale - up
+    low, high = np.stack([x.min(axis=1), y.min(axis=1)], axis=1), np.stack([x.max(axis=1), y.max(axis=1)], axis=1)
     shift = np.random.default_rng(seed).random((len(lit), 2))
     low = low - (0.5 + 0.5 * shift) * step
-    tips = np.stack([x.T, y.T], axis=2) if len(points) <= _MOST_TIPS else np.zeros((len(lit), 0, 2))
+    tips = np.stack([x, y], axis=2) if len(points) <= _MOST_TIPS else np.zeros((len(lit), 0, 2))
     return Lattice(low, step, tips), np.ceil((high - low) / step + 0.25).astype(np.int64)
 
 

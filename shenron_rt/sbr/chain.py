@@ -12,7 +12,7 @@ from .._typing import BoolArray, FloatArray, IntArray, NDArray
 from .surface import Surface
 from .views import Rays, Views
 
-__all__ = ["Bounce", "Chain", "dot", "mirrored", "sees", "trace_chain"]
+__all__ = ["Bounce", "Chain", "alike", "dot", "mirrored", "sees", "trace_chain"]
 
 #: Multiplier of the hash of a chain of surfaces (the golden ratio times 2^64).
 _MIX = np.uint64(0x9E3779B97F4A7C15)
@@ -75,6 +75,13 @@ def dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     result += a[:, 1] * b[:, 1]
     result += a[:, 2] * b[:, 2]
     return result
+
+
+def alike(values: NDArray[Any]) -> BoolArray:
+    """Return (n,) whether the four numbers of a row are equal; NumPy reduces along short rows slowly."""
+    first, second, third, fourth = values.T
+    same: BoolArray = (first == second) & (second == third) & (third == fourth)
+    return same
 
 
 def mirrored(vector: FloatArray, normal: FloatArray) -> FloatArray:

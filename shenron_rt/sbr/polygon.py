@@ -42,28 +42,35 @@ def polygon_integral(vertices: FloatArray, gradient: FloatArray) -> ComplexArray
     .. [1] W. B. Gordon, "Far-field approximations to the Kirchhoff-Helmholtz representations of scattered fields",
        IEEE Trans. Antennas Propag. 23(4), 1975.
     """
-    following = np.roll(vertices, -1, axis=1)
-    edge, middle = following - vertices, 0.5 * (vertices + following)
-    along, at = _times(edge, gradient), _times(middle, gradient)
-    square = np.einsum("ni,ni->n", gradient, gradient)
-    size = np.abs(_times(vertices, gradient) - _times(vertices[:, :1], gradient)).max(axis=1)
+    x, y = np.ascontiguousarray(vertices.transpose(2, 1, 0))
+    gx, gy = gradient.T
+    phase = x * gx + y * gy
+    following = _rolled(phase)
+    half, middle = 0.5 * (following - phase), 0.5 * (following + phase)
+    weight = (gx * (_rolled(y) - y) - gy * (_rolled(x) - x)) * np.sinc(half / np.pi)
+    square = gx * gx + gy * gy
+    size = np.abs(phase - phase[0]).max(axis=0)
     settled = size > _SMALL
-    across = gradient[:, None, 0] * edge[:, :, 1] - gradient[:, None, 1] * edge[:, :, 0]
-    terms = across * np.sinc(along / (2.0 * np.pi)) * np.exp(-1j * at)
-    contour = 1j / np.where(settled, square, 1.0) * terms.sum(axis=1)
-    # Triangles from the first corner to each edge: over one with phases 0, a, b at its corners the mean phase is
-    # (a + b) / 3, the mean square (a^2 + ab + b^2) / 6.
-    start = _times(vertices[:, :1], gradient)[:, 0]
-    a = _times(vertices, gradient) - start[:, None]
-    b = _times(following, gradient) - start[:, None]
-    local = vertices - vertices[:, :1]
-    next_local = following - vertices[:, :1]
-    piece = 0.5 * (local[:, :, 0] * next_local[:, :, 1] - local[:, :, 1] * next_local[:, :, 0])
-    series = (piece * (1.0 - 1j * (a + b) / 3.0 - (a * a + a * b + b * b) / 12.0)).sum(axis=1)
-    result: ComplexArray = np.where(settled, contour, np.exp(-1j * start) * series)
-    return result
+    contour: ComplexArray = (weight * np.sin(middle)).sum(axis=0) + 1j * (weight * np.cos(middle)).sum(axis=0)
+    contour /= np.where(settled, square, 1.0)
+    small = np.flatnonzero(~settled)
+    contour[small] = _series(x[:, small], y[:, small], phase[:, small])
+    return contour
 
 
-def _times(points: FloatArray, gradient: FloatArray) -> FloatArray:
-    values: FloatArray = points[:, :, 0] * gradient[:, None, 0] + points[:, :, 1] * gradient[:, None, 1]
-    return values
+def _series(x: FloatArray, y: FloatArray, phase: FloatArray) -> ComplexArray:
+    """Return (n,) integrals over polygons (m, n) whose phases differ little.
+
+    Triangles from the first corner to each edge: over one with phases 0, a, b at its corners the mean phase is
+    (a + b) / 3, the mean square (a^2 + ab + b^2) / 6.
+    """
+    right, up, a = x - x[0], y - y[0], phase - phase[0]
+    b = _rolled(a)
+    piece = 0.5 * (right * _rolled(up) - up * _rolled(right))
+    series = (piece * (1.0 - 1j * (a + b) / 3.0 - (a * a + a * b + b * b) / 12.0)).sum(axis=0)
+    return np.asarray(np.exp(-1j * phase[0]) * series)
+
+
+def _rolled(values: FloatArray) -> FloatArray:
+    """Return what the next corner has, in the place of each."""
+    return np.concatenate([values[1:], values[:1]])

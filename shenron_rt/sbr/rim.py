@@ -218,17 +218,16 @@ class Rim:
     def _outlines(self, crossed: BoolArray, share: FloatArray) -> FloatArray:
         """Return the outlines of the pieces: from the corner along its two sides and to where the cuts meet."""
         at = _PLACE + share[:, :, None] * (np.roll(_PLACE, -1, axis=0) - _PLACE)  # on the side from k to k + 1
-        count = crossed.sum(axis=1)[:, None]
-        cuts = (at * crossed[:, :, None]).sum(axis=1) / np.maximum(count, 1)
-        middle = np.where(count > 0, cuts, 0.5)
-        outline = [
-            np.stack(
-                [np.zeros_like(middle), at[:, k] - _PLACE[k], middle - _PLACE[k], at[:, k - 1] - _PLACE[k]], axis=1
+        weight = crossed / np.maximum(crossed @ np.ones(4), 1.0)[:, None]
+        weight[~crossed.any(axis=1)] = 0.25  # of four sides that meet at their middles
+        middle = np.einsum("nk,nki->ni", weight, at)
+        outline = np.zeros((len(at), 4, 4, 2))
+        for k in range(4):
+            outline[:, k, 1], outline[:, k, 2], outline[:, k, 3] = (
+                p - _PLACE[k] for p in (at[:, k], middle, at[:, k - 1])
             )
-            for k in range(4)
-        ]
-        side = self.lattice.step / 2**self.cells.level
-        return np.asarray(side * np.stack(outline, axis=1).reshape(-1, 4, 2))
+        outline *= self.lattice.step / 2**self.cells.level
+        return outline.reshape(-1, 4, 2)
 
     def _shares(self, a: IntArray, b: IntArray, wavelength: float | None) -> tuple[FloatArray, BoolArray]:
         """Return the share of the way from rays a to b at which what a sees ends, and whether the place is clean.

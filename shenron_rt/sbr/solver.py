@@ -192,11 +192,11 @@ class _Sum:
         found, pending = [], []
         for order, bounce in enumerate(chain.bounces):
             rows = bounce.row_of[corner[alive]]
-            hits = (rows >= 0).sum(axis=1)
-            whole = np.flatnonzero(hits == 4)
+            first, second, third, fourth = (rows >= 0).T
+            whole = np.flatnonzero(first & second & third & fourth)
             tube = np.zeros(len(alive), dtype=bool)
             tube[whole] = is_tube(bounce, rows[whole], wavelength, order == 0)
-            touched = hits > 0
+            touched = first | second | third | fourth
             if order == 0:
                 touched |= self.lattice.holds_tip(cells)
             unclear = alive[touched & ~tube]

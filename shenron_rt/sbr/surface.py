@@ -66,10 +66,16 @@ class Surface:
         return np.asarray(self.mesh.bounds.mean(axis=0))
 
     @functools.cached_property
+    def points(self) -> FloatArray:
+        """(v, 3) vertices of faces, from the centre [m]."""
+        used = np.zeros(len(self.mesh.vertices), dtype=bool)
+        used[self.mesh.faces] = True
+        return np.asarray(self.mesh.vertices[used] - self.centre)
+
+    @functools.cached_property
     def radius(self) -> float:
         """Largest distance of a vertex from the centre [m]."""
-        used = self.mesh.vertices[np.unique(self.mesh.faces)]
-        return float(np.linalg.norm(used - self.centre, axis=1).max())
+        return float(np.sqrt(_dot(self.points, self.points).max()))
 
     @functools.cached_property
     def normal(self) -> FloatArray:

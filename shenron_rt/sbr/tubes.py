@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray, NDArray
-from .chain import Bounce, Chain, dot
+from .chain import Bounce, Chain, alike, dot
 from .fields import Fields, radiated
 from .views import Views
 
@@ -42,7 +42,7 @@ def is_tube(bounce: Bounce, rows: IntArray, wavelength: float, first: bool) -> B
     (n,) bool
     """
     mark = bounce.signature[rows]
-    same: BoolArray = (mark == mark[:, :1]).all(axis=1)
+    same = alike(mark)
     check = np.flatnonzero(same & ~_on_one_facet(bounce, rows) if first else same)
     fits = np.ones(len(check), dtype=bool)
     for a, b in PAIRS:
@@ -155,9 +155,7 @@ def tube_echoes(
 
 
 def _on_one_facet(bounce: Bounce, rows: IntArray) -> BoolArray:
-    face = bounce.face[rows]
-    alike: BoolArray = (face == face[:, :1]).all(axis=1)
-    return alike
+    return alike(bounce.face[rows])
 
 
 def _mean_direction(bounce: Bounce, rows: IntArray) -> FloatArray:
