@@ -31,6 +31,9 @@ DEFAULT_RAYS_PER_WAVELENGTH = 1.0
 #: a corner is worth it, and costs little; a car has so many that the rest of their cells average out.
 _LEVELS = ((160.0, 5), (320.0, 2), (700.0, 1), (math.inf, 0))
 MOST_BOUNCES = 10
+#: Near the radar cells are no wider than sqrt(lambda R / 512): at an edge the front within half a cell counts as flat,
+#: and bends by lambda / 4096. A null of a trihedral at 1 m, 20 dB down, is off by 0.5 dB with cells of 24 GHz's lambda.
+_FRONT = 512.0
 #: Fields of a sweep that stay arrays when they are loaded.
 _ARRAYS = ("amplitude", "frequency_hz", "elevation_deg", "azimuth_deg")
 
@@ -164,7 +167,8 @@ def sweep_rcs(
     max_bounces : int
         Surfaces along a path, 1 to 10.
     rays_per_wavelength : float, optional
-        Of the coarsest cells, at the highest frequency; cells at edges are cut finer. Default 1.
+        Of the coarsest cells, at the highest frequency; cells at edges are cut finer. With a ``distance_m`` D below 512
+        wavelengths, cells for each sqrt(wavelength D / 512) in place of each wavelength. Default 1.
     bistatic : (azimuth_deg, elevation_deg), optional
         Direction of a transmitter that stays; the sweep is then the receiver's.
     material : str or None
@@ -229,7 +233,7 @@ def sweep_rcs(
     el, az = (a.ravel() for a in np.meshgrid(np.radians(elevation), np.radians(azimuth), indexing="ij"))
     views = Views(az, el, distance_m)
     _check_distance(views, surface)
-    step = SPEED_OF_LIGHT / float(frequency.max()) / density
+    step = cell_side(float(frequency.max()), density, distance_m)
     levels = next(n for width, n in _LEVELS if 2.0 * surface.radius <= width * step)
     settings = Settings(step, levels, max_bounces, seed)
     lit, receivers = (views, None) if bistatic is None else (_transmitter(bistatic, distance_m), views)
@@ -250,6 +254,13 @@ def sweep_rcs(
         name,
         seed,
     )
+
+
+def cell_side(frequency_hz: float, rays_per_wavelength: float, distance_m: float | None) -> float:
+    """Return the side of the coarsest cells [m] for the highest frequency and the distance of the radar, if any."""
+    wavelength = SPEED_OF_LIGHT / frequency_hz
+    bent = math.inf if distance_m is None else math.sqrt(wavelength * max(distance_m, wavelength) / _FRONT)
+    return min(wavelength, bent) / rays_per_wavelength
 
 
 def _axis(name: str, values: ArrayLike) -> FloatArray:

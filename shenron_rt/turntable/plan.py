@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from .._typing import ArrayLike, FloatArray, IntArray
-from ..constants import SPEED_OF_LIGHT
 from ..errors import InputError
-from ..rcs import DEFAULT_RAYS_PER_WAVELENGTH, sweep_rcs
+from ..rcs import DEFAULT_RAYS_PER_WAVELENGTH, cell_side, sweep_rcs
 from ..sbr.solver import CHUNK
 from ..scene.mesh import TaggedMesh
 from ..tracing.caster import RayCaster
@@ -149,8 +148,7 @@ def plan_sweep(
         raise InputError("plan_sweep: frequencies above 0, azimuths, elevations and rays per wavelength are needed")
     el, az = (a.ravel() for a in np.meshgrid(elevation, azimuth, indexing="ij"))
     lit = (az, el) if bistatic is None else (np.array([bistatic[0]]), np.array([bistatic[1]]))
-    spacing = SPEED_OF_LIGHT / float(frequency.max()) / density
-    cells = lattice_cells(mesh, lit[0], lit[1], spacing)
+    cells = lattice_cells(mesh, lit[0], lit[1], cell_side(float(frequency.max()), density, distance_m))
     thinned = min(1.0, _TRIAL_CELLS / float(cells.max()))
     work = cells * thinned if bistatic is None else np.ones(len(az))
     fixed = settings | {

@@ -12,7 +12,8 @@ __all__ = ["ground", "guard_rail", "pole", "wall"]
 # W-beam of EN 1317 / AASHTO M 180 type rails: 312 mm tall, 81 mm deep, two crests (common catalogue dimensions).
 _BEAM_HEIGHT = 0.312
 _BEAM_DEPTH = 0.081
-_BEAM_ROWS = 33
+# Strips of 1.3 mm across waves of 15 mm radius: sagittas of 14 um, a phase of 0.05 rad there and back at 77 GHz.
+_BEAM_ROWS = 241
 _POST_SPACING = 2.0
 
 
