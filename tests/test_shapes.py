@@ -152,6 +152,15 @@ def test_props_have_their_size_and_stand_on_the_ground(text, size, tolerance):
     assert np.all(np.abs(low + high)[:2] < 0.12 + 0.02 * np.array(size)[:2])
 
 
+def test_the_beam_of_a_guard_rail_is_a_smooth_wave_at_77_ghz():
+    """Its strips leave the wave by less than lambda / 256, a phase of 0.05 rad there and back."""
+    rail = make_shape("guard_rail:l=4")
+    beam = rail.select(_groups(rail, "beam"))
+    _, y, z = beam.vertices[beam.faces].mean(axis=1).T  # on the chords, a third of a strip from one end
+    wave = -0.5 * 0.081 * (1 - np.cos(4 * np.pi * (z - 0.75 + 0.312) / 0.312))
+    assert np.abs(y - wave).max() < 299_792_458 / 77e9 / 256
+
+
 def test_car_measures_4_5_by_1_8_by_1_45_without_mirrors():
     car = make_shape("car")
     mirrors = _groups(car, "left mirror", "right mirror")
