@@ -20,7 +20,7 @@ BANDS_GHZ = (24.0, 77.0)
 BOUNCES = 3
 #: Step of the aspect at 25 m, twice that in the far field [deg]. Car and truck mirror, so that half a circle
 #: is swept.
-STEP_DEG = {"car": 2.0, "truck": 4.0, "pedestrian": 4.0, "bicycle": 4.0, "pole": 5.0}
+STEP_DEG = {"car": 1.0, "truck": 2.0, "pedestrian": 2.0, "bicycle": 2.0, "pole": 5.0}
 MIRRORED = ("car", "truck")
 #: Of the trials that say why: off the axes of the body.
 TRIAL_STEP_DEG, TRIAL_FIRST_DEG = 10.0, 5.0
