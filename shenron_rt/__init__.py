@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .scatterers import Scatterers as Scatterers
     from .scene.mesh import TaggedMesh as TaggedMesh
     from .scene.readers import read_mesh as read_mesh
+    from .scene.rounding import round_mesh as round_mesh
     from .scene.shapes import make_shape as make_shape
     from .synthesis import AdcCube as AdcCube
     from .synthesis import synthesize as synthesize
@@ -92,6 +93,7 @@ _HOME = {
     "make_shape": "scene.shapes",
     "process": "dsp",
     "read_mesh": "scene.readers",
+    "round_mesh": "scene.rounding",
     "read_semantic_lidar": "lidar.read",
     "run_batch": "batch",
     "simulate": "pipeline",

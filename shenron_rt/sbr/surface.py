@@ -10,13 +10,12 @@ import numpy as np
 
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..scene.mesh import TaggedMesh
+from ..scene.smooth import connected, smooth_groups
 from ..tracing.backend import Backend
 from ..tracing.caster import RayCaster
 
-__all__ = ["Reflector", "Surface", "smooth_groups"]
+__all__ = ["Reflector", "Surface"]
 
-#: Faces that meet at less than this belong to one smooth surface: facets of a round body do, sides of a box do not.
-SMOOTH_ANGLE = np.radians(30.0)
 #: How far above its surface a reflected ray starts, as a share of the size of the target: float32 coordinates, which
 #: the caster works in, are off by up to 6e-8 of it.
 _LIFT = 2e-6
@@ -97,7 +96,7 @@ class Surface:
         """1 or -1, the sign that turns ``normal`` outwards, where the body is closed and convex; 0 where it is not."""
         a, b = self.mesh.adjacent
         n, normal = self.mesh.n_faces, self.normal
-        if 2 * len(a) != 3 * n or _connected(a, b, n).any():
+        if 2 * len(a) != 3 * n or connected(a, b, n).any():
             return 0
         middle = self.mesh.vertices[self.mesh.faces].mean(axis=1)
         bend = np.concatenate([_dot(normal[a], middle[b] - middle[a]), _dot(normal[b], middle[a] - middle[b])])
@@ -145,27 +144,3 @@ class Surface:
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,ij->i", a, b))
-
-
-def _connected(a: IntArray, b: IntArray, n: int) -> IntArray:
-    """Return (n,) numbers, equal for faces that hang together by the pairs a, b."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
-def smooth_groups(mesh: TaggedMesh, reflector: IntArray) -> IntArray:
-    """Return (f,) numbers, equal for faces connected over edges at which the surface bends by less than 30 degrees.
-
-    Parameters
-    ----------
-    mesh : TaggedMesh
-    reflector : (f,) int
-        Faces that reflect differently are never in one group.
-    """
-    a, b = mesh.adjacent
-    bend = np.abs(np.einsum("ij,ij->i", mesh.face_normal[a], mesh.face_normal[b]))
-    joined = (bend >= np.cos(SMOOTH_ANGLE)) & (reflector[a] == reflector[b])
-    return _connected(a[joined], b[joined], mesh.n_faces)
