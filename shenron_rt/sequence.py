@@ -30,7 +30,7 @@ def simulate_sequence(
     radar: str | None = None,
     seed: int | None = None,
     rays: int = 300_000,
-    max_bounces: int = 1,
+    max_bounces: int | None = None,
     model: str | ShenronModel = "physical",
     noise: str | None = "thermal",
     backend: str = "auto",
