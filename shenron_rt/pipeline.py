@@ -6,11 +6,11 @@ import functools
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import TYPE_CHECKING, TypedDict
 
 from .config.profile import RadarProfile
-from .config.scene import Scene
+from .config.scene import RadarMount, Scene
 from .dsp import Detections, RadarCube, detect, process
 from .errors import InputError
 from .frames import Pose
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .echo.shenron import ShenronModel
     from .synthesis.interference import HeardRadar
 
-__all__ = ["Frame", "from_scatterers", "simulate", "simulate_all"]
+__all__ = ["Frame", "SceneChain", "from_scatterers", "simulate", "simulate_all"]
 
 _log = logging.getLogger(__name__)
 
@@ -168,23 +168,78 @@ def simulate(
     if mount is not None:
         place = place.model_copy(update={"xyz_m": mount.xyz, "ypr_deg": mount.ypr_deg})
         source = source.model_copy(update={"radars": (place,)})
-    used = profile or source.profile_of(place)
-    look = functools.partial(
-        trace, source, radar=place.name, seed=seed, frame=frame, rays=rays, max_bounces=max_bounces, backend=backend
-    )
-    finish = functools.partial(
-        from_scatterers, model=model, noise=noise, accuracy=accuracy, time=time, previous=previous
-    )
-    scatterers = look(used, time=time)
-    heard = heard_radars(source, place, used, time=time, seed=scatterers.seed, frame=frame)
-    if retrace == 1:
-        return finish(scatterers, used, source.materials, interference=heard)
-    light = functools.partial(illuminate, model=model, materials=source.materials)
+    chain = SceneChain(
+        source, place, profile or source.profile_of(place), seed=seed, rays=rays, max_bounces=max_bounces,
+        backend=backend, model=model, noise=noise, accuracy=accuracy, retrace=retrace,
+    )  # fmt: skip
+    return chain.frame(frame, time, previous)
 
-    def several(returns: Returns) -> Iterator[tuple[RadarProfile, Returns]]:
-        return segments(used, returns, retrace, lambda part, start: look(part, time=time + start), light)
 
-    return finish(scatterers, used, source.materials, interference=heard, segments_of=several)
+@dataclass(frozen=True)
+class SceneChain:
+    """One radar of a scene, and how its frames are made: single ones, sequences and those that share their rays.
+
+    Parameters
+    ----------
+    scene : Scene
+    mount : RadarMount
+        The radar; one of the scene's.
+    profile : RadarProfile
+        Used in place of the mount's own.
+    seed, rays, max_bounces, backend, model, noise, accuracy, retrace
+        As for :func:`simulate`.
+    """
+
+    scene: Scene
+    mount: RadarMount
+    profile: RadarProfile
+    _: KW_ONLY
+    seed: int | None
+    rays: int
+    max_bounces: int | None
+    backend: str
+    model: str | ShenronModel
+    noise: str | None
+    accuracy: float
+    retrace: int
+
+    def frame(self, index: int, time: float, previous: Frame | None = None) -> Frame:
+        """Render the frame of an index that begins at scene seconds ``time``; the rest is as for :func:`simulate`."""
+        scatterers = self.trace(index, time)
+        if self.retrace == 1:
+            return self.finish(scatterers, time, previous)
+        light = functools.partial(illuminate, model=self.model, materials=self.scene.materials)
+
+        def several(returns: Returns) -> Iterator[tuple[RadarProfile, Returns]]:
+            def look(part: RadarProfile, start: float) -> Scatterers:
+                return replace(self, profile=part).trace(index, time + start)
+
+            return segments(self.profile, returns, self.retrace, look, light)
+
+        return self.finish(scatterers, time, previous, several)
+
+    def trace(self, index: int, time: float) -> Scatterers:
+        """Cast the rays of a frame."""
+        return trace(
+            self.scene, self.profile, radar=self.mount.name, time=time, seed=self.seed, frame=index, rays=self.rays,
+            max_bounces=self.max_bounces, backend=self.backend,
+        )  # fmt: skip
+
+    def finish(
+        self,
+        scatterers: Scatterers,
+        time: float,
+        previous: Frame | None = None,
+        segments_of: Callable[[Returns], Iterable[tuple[RadarProfile, Returns]]] | None = None,
+    ) -> Frame:
+        """Return the frame of scatterers that this radar's rays met; the rest is as for :func:`from_scatterers`."""
+        heard = heard_radars(
+            self.scene, self.mount, self.profile, time=time, seed=scatterers.seed, frame=scatterers.frame
+        )
+        return from_scatterers(
+            scatterers, self.profile, self.scene.materials, time=time, model=self.model, noise=self.noise,
+            accuracy=self.accuracy, previous=previous, interference=heard, segments_of=segments_of,
+        )  # fmt: skip
 
 
 def from_scatterers(

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .config.scene import RadarMount, Scene
-from .pipeline import Frame, from_scatterers
+from .pipeline import Frame, SceneChain
 from .run_setup import RunOptions
 from .scene.motion_of import check_times
 from .sequence import simulate_sequence
-from .synthesis.heard import heard_radars
 from .tracing.shared import trace_shared
 
 __all__ = ["rendered"]
@@ -61,23 +60,17 @@ def _at_one_place(scene: Scene) -> list[list[RadarMount]]:
 def _shared(
     scene: Scene, group: list[RadarMount], options: RunOptions, frames: range
 ) -> Iterator[tuple[RadarMount, Frame]]:
-    names = [m.name for m in group]
+    chains = [
+        SceneChain(scene, m, scene.profile_of(m), seed=scene.seed, noise="thermal", **options.arguments())
+        for m in group
+    ]
     last: dict[str, Frame] = {}
     for index in frames:
         time = index * scene.frame_period_s
-        seen = trace_shared(scene, names, time=time, frame=index, rays=options.rays, backend=options.backend)
-        for mount in group:
-            used = scene.profile_of(mount)
-            frame = from_scatterers(
-                seen[mount.name],
-                used,
-                scene.materials,
-                time=time,
-                model=options.model,
-                noise="thermal",
-                accuracy=options.accuracy,
-                previous=last.get(mount.name),
-                interference=heard_radars(scene, mount, used, time=time, seed=scene.seed, frame=index),
-            )
-            last[mount.name] = frame
-            yield mount, frame
+        seen = trace_shared(
+            scene, [m.name for m in group], time=time, frame=index, rays=options.rays, backend=options.backend
+        )
+        for chain in chains:
+            name = chain.mount.name
+            last[name] = chain.finish(seen[name], time, last.get(name))
+            yield chain.mount, last[name]

@@ -10,7 +10,7 @@ from .errors import InputError, did_you_mean
 from .io.npz import save_npz
 
 if TYPE_CHECKING:
-    from .runs import FrameLike
+    from .run_summary import FrameLike
 
 __all__ = ["DEFAULT_PARTS", "PARTS", "parts_of", "write_frame"]
 

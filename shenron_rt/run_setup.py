@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RunOptions", "config_text", "frame_range", "merge_options", "override_profile", "package_version",
-    "profile_label", "split_overrides", "summary_of", "with_profiles",
+    "profile_label", "refuse_repeated", "split_overrides", "summary_of", "with_profiles",
 ]  # fmt: skip
 
 #: Keys of meshes that may name a file.
@@ -84,6 +84,14 @@ def override_profile(profile: RadarProfile, overrides: Mapping[str, Any]) -> Rad
     return validate_model(RadarProfile, data, f"profile {profile.name} with --set")
 
 
+def refuse_repeated(profiles: Sequence[RadarProfile]) -> None:
+    """Raise an InputError where two profiles have one name."""
+    names = [p.name for p in profiles]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError(f"--profile {repeated[0]}: given twice")
+
+
 def with_profiles(scene: Scene, names: list[str], overrides: Mapping[str, Any]) -> Scene:
     """Put profiles into the radars: one replaces them all, several make a copy of each radar for each."""
     from .config.profile import load_profile
@@ -92,9 +100,7 @@ def with_profiles(scene: Scene, names: list[str], overrides: Mapping[str, Any]) 
         mounts = [(r.name, r, scene.profile_of(r)) for r in scene.radars]
     else:
         loaded = [load_profile(n) for n in names]
-        repeated = sorted({p.name for p in loaded if [q.name for q in loaded].count(p.name) > 1})
-        if repeated:
-            raise InputError(f"--profile {repeated[0]}: given twice")
+        refuse_repeated(loaded)
         mounts = [(r.name if len(loaded) == 1 else f"{r.name}_{p.name}", r, p) for r in scene.radars for p in loaded]
     radars = [
         mount.model_copy(update={"name": name, "profile": override_profile(used, overrides)})

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 
 from .config.profile import RadarProfile
 from .config.scene import Scene
-from .pipeline import Frame, from_scatterers, simulate
+from .pipeline import Frame, SceneChain
 from .scatterers import Scatterers
 from .scene.motion_of import check_times
-from .synthesis.heard import heard_radars
-from .tracing import trace
 
 if TYPE_CHECKING:
     from .echo.shenron import ShenronModel
@@ -32,7 +30,7 @@ def simulate_sequence(
     radar: str | None = None,
     seed: int | None = None,
     rays: int = 300_000,
-    max_bounces: int = 1,
+    max_bounces: int | None = None,
     model: str | ShenronModel = "physical",
     noise: str | None = "thermal",
     backend: str = "auto",
@@ -61,65 +59,35 @@ def simulate_sequence(
         Something of the scene has no pose at one of the frames, raised before the first; and what a frame raises.
     """
     mount = scene.radar(radar)
-    used = profile or scene.profile_of(mount)
-    numbers = list(frames)
-    check_times(scene, (k * scene.frame_period_s + used.frame_mid_s for k in numbers))
-    if retrace != 1:  # its rays are cast while its echoes are summed
-        last: Frame | None = None
-        for k in numbers:
-            last = simulate(
-                scene,
-                used,
-                radar=mount.name,
-                time=k * scene.frame_period_s,
-                seed=seed,
-                frame=k,
-                rays=rays,
-                max_bounces=max_bounces,
-                model=model,
-                noise=noise,
-                backend=backend,
-                accuracy=accuracy,
-                retrace=retrace,
-                previous=last,
-            )
-            yield last
+    chain = SceneChain(
+        scene, mount, profile or scene.profile_of(mount), seed=seed, rays=rays, max_bounces=max_bounces,
+        backend=backend, model=model, noise=noise, accuracy=accuracy, retrace=retrace,
+    )  # fmt: skip
+    timed = [(k, k * scene.frame_period_s) for k in frames]
+    check_times(scene, (time + chain.profile.frame_mid_s for _, time in timed))
+    if retrace == 1:
+        yield from _overlapped(chain, timed)
         return
-    done: list[Frame] = []  # the last one, for what two frames tell together
+    last: Frame | None = None
+    for k, time in timed:  # its rays are cast while its echoes are summed
+        last = chain.frame(k, time, last)
+        yield last
+
+
+def _overlapped(chain: SceneChain, timed: Iterable[tuple[int, float]]) -> Iterator[Frame]:
+    """Yield frames of (index, time [s]), each finished in a thread while the rays of the next are cast."""
+    last: list[Frame | None] = [None]  # for what two frames tell together
 
     def finish(scatterers: Scatterers, time: float) -> Frame:
-        heard = heard_radars(scene, mount, used, time=time, seed=scatterers.seed, frame=scatterers.frame)
-        frame = from_scatterers(
-            scatterers,
-            used,
-            scene.materials,
-            time=time,
-            model=model,
-            noise=noise,
-            accuracy=accuracy,
-            previous=done[-1] if done else None,
-            interference=heard,
-        )
-        done[:] = [frame]
+        frame = chain.finish(scatterers, time, last[0])
+        last[0] = frame
         return frame
 
     waiting: deque[Future[Frame]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="shenron-rt-frame") as worker:
         try:
-            for k in numbers:
-                time = k * scene.frame_period_s
-                scatterers = trace(
-                    scene,
-                    used,
-                    radar=mount.name,
-                    time=time,
-                    seed=seed,
-                    frame=k,
-                    rays=rays,
-                    max_bounces=max_bounces,
-                    backend=backend,
-                )
-                waiting.append(worker.submit(finish, scatterers, time))
+            for k, time in timed:
+                waiting.append(worker.submit(finish, chain.trace(k, time), time))
                 if len(waiting) == _AHEAD:
                     yield waiting.popleft().result()
             while waiting:

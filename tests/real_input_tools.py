@@ -149,8 +149,8 @@ def rival_db(frame: srt.Frame, object_id: int) -> float:
     return float(10 * np.log10(near.max() / own[r, v]))
 
 
-def locks(frame: srt.Frame) -> dict[int, Lock]:
-    """Return for every object with an id of its own what was detected on it.
+def lock_on(frame: srt.Frame, object_id: int) -> Lock:
+    """Return what was detected on an object that rays have met.
 
     A detection lies on an object when its range is within one bin of the ranges, its velocity within one bin of the
     range rates (folded), and its azimuth within the beam, 2/M in sine, of the azimuths that the object's visible
@@ -158,26 +158,27 @@ def locks(frame: srt.Frame) -> dict[int, Lock]:
     """
     p, rows, table = frame.profile, frame.scatterers, frame.detections.table
     beam, v_span = 2 / len(frame.cube.azimuth_channels), 2 * p.max_velocity_mps
-    out = {}
-    for key in frame.returns.power_by_object():
-        mine = rows.object_id == key
-        if key == 0 or not mine.any():
-            continue
-        distance, rate = rows.range[mine], rows.range_rate[mine]
-        sine = rows.position[mine, 1] / distance
-        on = (table["range"] > distance.min() - frame.cube.range_step_m) & (
-            table["range"] < distance.max() + frame.cube.range_step_m
-        )
-        on &= (np.sin(table["azimuth"]) > sine.min() - beam) & (np.sin(table["azimuth"]) < sine.max() + beam)
-        middle, half = (rate.min() + rate.max()) / 2, (rate.max() - rate.min()) / 2
-        off = (table["velocity"] - middle + v_span / 2) % v_span - v_span / 2
-        on &= np.abs(off) < half + frame.cube.velocity_step_mps
-        out[key] = Lock(
-            key,
-            own_snr_db(frame, key),
-            (float(distance.min()), float(distance.max())),
-            (float(np.arcsin(sine.min())), float(np.arcsin(sine.max()))),
-            (float(rate.min()), float(rate.max())),
-            table[on],
-        )
-    return out
+    mine = rows.object_id == object_id
+    distance, rate = rows.range[mine], rows.range_rate[mine]
+    sine = rows.position[mine, 1] / distance
+    on = (table["range"] > distance.min() - frame.cube.range_step_m) & (
+        table["range"] < distance.max() + frame.cube.range_step_m
+    )
+    on &= (np.sin(table["azimuth"]) > sine.min() - beam) & (np.sin(table["azimuth"]) < sine.max() + beam)
+    middle, half = (rate.min() + rate.max()) / 2, (rate.max() - rate.min()) / 2
+    off = (table["velocity"] - middle + v_span / 2) % v_span - v_span / 2
+    on &= np.abs(off) < half + frame.cube.velocity_step_mps
+    return Lock(
+        object_id,
+        own_snr_db(frame, object_id),
+        (float(distance.min()), float(distance.max())),
+        (float(np.arcsin(sine.min())), float(np.arcsin(sine.max()))),
+        (float(rate.min()), float(rate.max())),
+        table[on],
+    )
+
+
+def locks(frame: srt.Frame) -> dict[int, Lock]:
+    """Return for every object with an id of its own, that rays have met, what was detected on it."""
+    met = [k for k in frame.returns.power_by_object() if k and np.any(frame.scatterers.object_id == k)]
+    return {k: lock_on(frame, k) for k in met}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contract_tools import FAST, db, is_the_car, perturbed, strongest_cell, twin, with_chrono
-from real_input_tools import locks
+from real_input_tools import lock_on
 
 import shenron_rt as srt
 
@@ -66,7 +66,7 @@ def test_chrono_sedan_is_detected_between_the_walls(shared_data: Path) -> None:
     scene = with_chrono(srt.load_scene("braking"), shared_data)
     for seed in range(3):
         frame = srt.simulate(perturbed(scene, seed), seed=seed, **FAST)
-        lock = locks(frame)[101]
+        lock = lock_on(frame, 101)
         assert lock.snr_db < 15 or 101 in lock.found["object_id"], str(lock)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contract_tools import FAST, apparent_rcs_dbsm, perturbed, with_chrono
-from real_input_tools import locks
+from real_input_tools import lock_on
 
 import shenron_rt as srt
 
@@ -92,7 +92,7 @@ def turn(time: float, profile: str = "awrl1432", data: Path | None = None) -> sr
 @pytest.mark.parametrize("profile", ["awrl1432", "radarbook"])
 @pytest.mark.parametrize("time", TIMES)
 def test_turning_car_is_detected_from_every_side(time: float, profile: str) -> None:
-    lock = locks(turn(time, profile))[101]
+    lock = lock_on(turn(time, profile), 101)
     assert 101 in lock.found["object_id"], str(lock)
 
 
@@ -119,7 +119,7 @@ def test_lambda_squared_is_most_of_what_24_ghz_has_over_77_ghz() -> None:
 def test_chrono_sedan_is_detected_from_most_sides(shared_data: Path) -> None:
     seen = []
     for time in TIMES:
-        lock = locks(turn(time, "awrl1432", shared_data))[101]
+        lock = lock_on(turn(time, "awrl1432", shared_data), 101)
         seen.append(101 in lock.found["object_id"])
         assert seen[-1] or lock.snr_db < 15.0, str(lock)
     assert sum(seen) >= 5, seen

@@ -10,7 +10,7 @@ import pytest
 from shenron_rt.errors import InputError
 from shenron_rt.objects import ClusterSettings, Measurement, Tracker, TrackerSettings, cluster
 from shenron_rt.objects.clusters import density_clusters
-from shenron_rt.objects.kalman import constant_velocity, predict, steady_state_gain, update
+from shenron_rt.objects.kalman import constant_velocity, predict, update
 
 
 # ---- clusters
@@ -66,6 +66,16 @@ def test_a_reach_of_nothing_is_refused() -> None:
 
 
 # ---- Kalman
+def alpha_beta(tracking_index: float) -> tuple[float, float]:
+    """Gains of position and (over T) velocity that the filter settles at, for acceleration_std T^2 / measurement_std.
+
+    P. R. Kalata, IEEE Trans. Aerosp. Electron. Syst. AES-20, 174-182 (1984), doi:10.1109/TAES.1984.310438.
+    """
+    r = (4 + tracking_index - np.sqrt(8 * tracking_index + tracking_index**2)) / 4
+    alpha = 1 - r**2
+    return float(alpha), float(2 * (2 - alpha) - 4 * np.sqrt(1 - alpha))
+
+
 @pytest.mark.parametrize("index", [0.01, 0.3, 1.0, 5.0])
 def test_the_filter_settles_at_the_alpha_beta_gains(index: float) -> None:
     T, sigma = 0.1, 0.7
@@ -76,7 +86,7 @@ def test_the_filter_settles_at_the_alpha_beta_gains(index: float) -> None:
         _, P = predict(np.zeros(2), P, F, Q)
         gain = (P @ H.T / (H @ P @ H.T + R))[:, 0]
         _, P = update(np.zeros(2), P, np.zeros(1), H, R)
-    alpha, beta = steady_state_gain(index)
+    alpha, beta = alpha_beta(index)
     assert gain[0] == pytest.approx(alpha, rel=1e-9)
     assert gain[1] * T == pytest.approx(beta, rel=1e-9)
     # and the covariance after the measurement is that of the closed form, alpha sigma^2

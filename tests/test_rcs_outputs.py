@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
+import math
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -218,39 +219,52 @@ def test_cells_are_those_of_the_silhouette() -> None:
     assert np.abs(cells - expected).max() <= 102  # rounding may add a row
 
 
-def _dihedral() -> dict[str, Any]:
-    return {"frequency_hz": 24e9, "azimuth_deg": np.arange(-30.0, 30.1, 0.5), "elevation_deg": [0.0, 20.0]}
+#: Plans and runs a sweep, in a process of its own: what the tests before have left in this one is in no number.
+MEASURE = """
+import json, pathlib, re, time, numpy, shenron_rt as srt
+from shenron_rt.turntable.plan import plan_sweep
+mesh = srt.make_shape("dihedral:a=0.6,b=0.6,h=0.5")
+sweep = dict(frequency_hz=24e9, azimuth_deg=numpy.arange(-30.0, 30.1, 0.5), elevation_deg=[0.0, 20.0])
+srt.sweep_rcs(mesh, frequency_hz=24e9, azimuth_deg=0.0)  # imports and kernels are in neither time
+plan = plan_sweep(mesh, **sweep)
+began = time.perf_counter()
+srt.sweep_rcs(mesh, **sweep)
+seconds = time.perf_counter() - began
+status = pathlib.Path("/proc/self/status")
+peak = re.search("VmHWM: *([0-9]+)", status.read_text().expandtabs()) if status.exists() else None
+counts = [plan.aspects, plan.frequencies, plan.cells, plan.rays]
+memory = None if peak is None else [plan.memory_bytes, 1024 * int(peak.group(1))]
+print(json.dumps({"counts": counts, "seconds": [plan.seconds, seconds], "memory": memory}))
+"""
 
 
-def test_planned_time_is_within_a_factor_of_three_of_the_run() -> None:
-    mesh = srt.make_shape("dihedral:a=0.6,b=0.6,h=0.5")
-    ratios = []
-    for _ in range(2):  # a machine shared with others may stall one of them
-        plan = plan_sweep(mesh, **_dihedral())
-        began = time.perf_counter()
-        srt.sweep_rcs(mesh, **_dihedral())
-        ratios.append(plan.seconds / (time.perf_counter() - began))
-    assert plan.aspects == 242
-    assert plan.frequencies == 1
-    assert plan.cells < plan.rays
-    assert min(abs(np.log(r)) for r in ratios) < np.log(3.0), ratios
+def _planned_and_run() -> dict[str, list[float]]:
+    """Return pairs of what was planned and what it came to."""
+    ran = subprocess.run([sys.executable, "-c", MEASURE], capture_output=True, text=True, check=True)
+    return dict(json.loads(ran.stdout))
+
+
+@pytest.fixture(scope="module")
+def measured() -> dict[str, list[float]]:
+    return _planned_and_run()
+
+
+def _off(pair: list[float]) -> float:
+    return abs(math.log(pair[0] / pair[1]))
+
+
+def test_planned_time_is_within_a_factor_of_three_of_the_run(measured: dict[str, list[float]]) -> None:
+    aspects, frequencies, cells, rays = measured["counts"]
+    assert (aspects, frequencies) == (242, 1)
+    assert cells < rays
+    if _off(measured["seconds"]) >= math.log(3.0):  # a machine shared with others may stall one of them
+        measured = _planned_and_run()
+    assert _off(measured["seconds"]) < math.log(3.0), measured
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is read from /proc")
-def test_planned_memory_is_within_a_factor_of_three_of_the_run() -> None:
-    code = (  # a process of its own: what the tests before have left in this one is in neither number
-        "import numpy, pathlib, re, shenron_rt as srt\n"
-        "from shenron_rt.turntable.plan import plan_sweep\n"
-        "mesh = srt.make_shape('dihedral:a=0.6,b=0.6,h=0.5')\n"
-        "sweep = dict(frequency_hz=24e9, azimuth_deg=numpy.arange(-30.0, 30.1, 0.5), elevation_deg=[0.0, 20.0])\n"
-        "planned = plan_sweep(mesh, **sweep).memory_bytes\n"
-        "srt.sweep_rcs(mesh, **sweep)\n"
-        "status = pathlib.Path('/proc/self/status').read_text().expandtabs()\n"
-        "print(planned, 1024 * int(re.search('VmHWM: *([0-9]+)', status).group(1)))"
-    )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    planned, used = (int(word) for word in ran.stdout.split())
-    assert used / 3 < planned < 3 * used
+def test_planned_memory_is_within_a_factor_of_three_of_the_run(measured: dict[str, list[float]]) -> None:
+    assert _off(measured["memory"]) < math.log(3.0), measured
 
 
 def test_plans_add_up_along_frequency() -> None:

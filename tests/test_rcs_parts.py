@@ -11,11 +11,12 @@ from shenron_rt.physics import fresnel, fresnel_cos
 from shenron_rt.sbr.chain import Bounce, Chain, trace_chain
 from shenron_rt.sbr.fields import Fields, fields_along
 from shenron_rt.sbr.polygon import polygon_integral
-from shenron_rt.sbr.surface import Reflector, Surface, smooth_groups
+from shenron_rt.sbr.surface import Reflector, Surface
 from shenron_rt.sbr.tubes import in_line
 from shenron_rt.sbr.views import Views
 from shenron_rt.scene.mesh import TaggedMesh, build_mesh, concatenate
 from shenron_rt.scene.shapes import make_shape
+from shenron_rt.scene.smooth import smooth_groups
 from shenron_rt.tracing.backend import choose_backend
 
 CONCRETE = 5.24 - 0.3225j

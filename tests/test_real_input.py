@@ -12,6 +12,7 @@ from real_input_tools import (
     TOWN_OBJ,
     chrono_sedan,
     frame_meta,
+    lock_on,
     locks,
     rival_db,
     street_scene,
@@ -157,7 +158,7 @@ actors:
 """
     (tmp_path / "street.yaml").write_text(text)
     frame = srt.simulate(srt.load_scene(tmp_path / "street.yaml"), seed=1, rays=20_000, accuracy=1e-3)
-    lock = locks(frame)[101]
+    lock = lock_on(frame, 101)
     assert lock.snr_db > NEEDED_SNR_DB
     assert 101 in lock.found["object_id"], str(lock)
 
@@ -167,11 +168,11 @@ def test_locks_reject_a_detection_off_the_object(shared_data: Path) -> None:
     frame = srt.simulate(street_scene(shared_data), seed=1, rays=20_000, accuracy=1e-3)
     table = frame.detections.table
     mine = table[table["object_id"] == 102]
-    lock = locks(frame)[102]
+    lock = lock_on(frame, 102)
     assert len(lock.found)
     width = lock.range_m[1] - lock.range_m[0]
     for name, shift in (("range", -width - 0.8), ("azimuth", np.radians(45)), ("velocity", 3.0)):
         moved = mine.copy()
         moved[name] += shift
         off = replace(frame, detections=srt.Detections(moved, 1))
-        assert not len(locks(off)[102].found), name
+        assert not len(lock_on(off, 102).found), name

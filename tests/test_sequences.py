@@ -188,6 +188,13 @@ def test_sequence_gives_the_frames_of_single_calls():
         assert f.adc.data.tobytes() == alone.adc.data.tobytes()
 
 
+def test_sequence_bounces_as_often_as_the_scene_says():
+    scene = srt.load_scene("braking").model_copy(update={"max_bounces": 2})
+    (frame,) = simulate_sequence(scene, frames=[0], rays=1_000, accuracy=1e-3)
+    assert frame.scatterers.paths is not None
+    assert frame.adc.data.tobytes() == srt.simulate(scene, rays=1_000, accuracy=1e-3).adc.data.tobytes()
+
+
 def test_frames_beyond_a_trajectory_are_refused_before_the_first_is_rendered():
     scene = srt.load_scene("braking")
     with pytest.raises(ValueError, match=r"trajectory of .* 12.* s is outside its keyframes, 0 to 9 s"):

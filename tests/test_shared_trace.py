@@ -75,10 +75,10 @@ def test_echoes_of_radars_that_share_rays_are_those_of_radars_alone(braking: srt
     twice that where it adds up in phase. 1 dB stands for sampling. Walls are rough and graze: speckle of some thousand
     cells that count as few hundred.
     """
-    options = RunOptions(rays=30_000)
+    options = RunOptions(rays=30_000, accuracy=1e-3)
     shared = {m.profile.name: f for m, f in rendered(braking, options, range(1))}
     for name in NAMES:
-        alone = srt.simulate(braking, radar=f"front_{name}", rays=30_000)
+        alone = srt.simulate(braking, radar=f"front_{name}", rays=30_000, accuracy=1e-3)
         one, other = (f.returns.power_by_object()[101] for f in (alone, shared[name]))
         assert 10 * np.log10(other / one) == pytest.approx(0.0, abs=1.2), name
         rows = [f.detections.table[f.detections.object_id == 101][0] for f in (alone, shared[name])]

@@ -115,7 +115,7 @@ def _masker(case: Case, contributions: Contributions, own: int, look: Look, othe
     if in_cell < _FILLS * mine:
         how = "threshold"
     elif float(power[near].sum()) >= _NEIGHBOUR * in_cell:
-        how = "ambiguous" if _only_folded(contributions, own, first, look) else "cell"
+        how = "ambiguous" if _only_folded(contributions, own, first) else "cell"
     return _Masker(first, name, how, alone is not None, db(in_cell / mine), db(in_threshold / mine), velocity)
 
 
@@ -129,7 +129,7 @@ def _levels(contributions: Contributions, look: Look, number: int) -> tuple[floa
     return float(power[np.ix_(rows, columns)].max()), float(level)
 
 
-def _only_folded(contributions: Contributions, own: int, other: int, look: Look) -> bool:
+def _only_folded(contributions: Contributions, own: int, other: int) -> bool:
     """Tell whether two objects share a cell only because their velocities fold."""
     p = contributions.cube.profile
     mine, theirs = (middle_of(contributions.returns_of(i)).velocity_mps for i in (own, other))

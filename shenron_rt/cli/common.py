@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
-    "Json", "Output", "Overrides", "Overwrite", "ProfileNames", "SetOptions", "complain", "frame_range",
-    "log_to_stderr", "override_profile", "print_json", "progress", "say", "show_table",
+    "Json", "Output", "Overrides", "Overwrite", "ProfileNames", "SetOptions", "check_seed", "chosen_frames", "complain",
+    "frame_range", "log_to_stderr", "override_profile", "print_json", "progress", "say", "show_table",
 ]  # fmt: skip
 
 Output: TypeAlias = Annotated[
@@ -80,6 +80,21 @@ class Overrides:
             raise InputError(
                 f"--set scene.{next(iter(self.scene))}: {verb} has no scene; allowed: profile., processing."
             )
+
+
+def check_seed(seed: int) -> int:
+    """Return a seed that may be one."""
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
+    return seed
+
+
+def chosen_frames(text: str | None, count: int, there: str) -> range:
+    """Return the frames ``A:B`` of as many as ``there`` says there are; all of them by default."""
+    wanted = frame_range(text) if text else range(count)
+    if wanted.stop > count:
+        raise InputError(f"--frames {text}: {there}, 0:{count} is all of them")
+    return wanted
 
 
 # ---- output

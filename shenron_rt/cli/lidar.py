@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
+from ..run_setup import refuse_repeated
 from ._lidar_input import LidarOptions, pose_of, read_frame, side_files
 from .common import (
     Json,
@@ -19,7 +20,8 @@ from .common import (
     Overwrite,
     ProfileNames,
     SetOptions,
-    frame_range,
+    check_seed,
+    chosen_frames,
     override_profile,
     print_json,
     progress,
@@ -114,8 +116,7 @@ def lidar(
 
     if not files:
         raise InputError("lidar: give at least one file")
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
+    check_seed(seed)
     sides = side_files(side_file or [], files)
     options = LidarOptions(
         tag_table, frame, origin, sensor_pose, mount, sides, ego_velocity, grid, crop_ego, crop_old_pipeline,
@@ -124,9 +125,7 @@ def lidar(
     overrides = Overrides(set_)
     overrides.only_profile("lidar")
     chosen = _profiles(profile or ["awrl1432"], overrides.profile)
-    wanted = frame_range(frames) if frames else range(len(files))
-    if wanted.stop > len(files):
-        raise InputError(f"--frames {frames}: {len(files)} files are given, 0:{len(files)} is all of them")
+    wanted = chosen_frames(frames, len(files), f"{len(files)} files are given")
     if merge_sweeps is not None:
         wanted = _with_an_earlier(wanted, merge_sweeps)
     default = partial(runs.default_folder, files[wanted.start].stem, "+".join(p.name for p in chosen))
@@ -160,9 +159,7 @@ def _profiles(names: Sequence[str], overrides: Mapping[str, str]) -> list[RadarP
     from ..config.profile import load_profile
 
     loaded = [override_profile(load_profile(n), overrides) for n in names]
-    repeated = sorted({p.name for p in loaded if [q.name for q in loaded].count(p.name) > 1})
-    if repeated:
-        raise InputError(f"--profile {repeated[0]}: given twice")
+    refuse_repeated(loaded)
     return loaded
 
 

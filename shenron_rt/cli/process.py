@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,7 @@ from .common import (
     Overrides,
     Overwrite,
     SetOptions,
-    frame_range,
+    chosen_frames,
     override_profile,
     print_json,
     progress,
@@ -99,30 +100,15 @@ def process(
 
     overrides = Overrides(set_)
     overrides.only_profile("process")
-    cubes = _read(adc, profile, overrides, _Format(layout, level, swap_iq))
-    wanted = frame_range(frames) if frames else range(len(cubes))
-    if wanted.stop > len(cubes):
-        raise InputError(f"--frames {frames}: {adc} has {len(cubes)} frames, 0:{len(cubes)} is all of them")
+    form = _Format(layout, level, swap_iq)
+    cubes = _read(adc, profile, overrides, form)
+    wanted = chosen_frames(frames, len(cubes), f"{adc} has {len(cubes)} frames")
     used = cubes[0].profile
     default = partial(runs.default_folder, adc.stem, used.name)
-    with (
-        runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place,
-        progress(len(wanted), "processing", quiet=json_) as step,
-    ):
-        records, last = [], None
-        for index in wanted:
-            frame = last = _frame(cubes[index], index, frame_period_s, last)
-            folder = runs.frame_folder(place.partial, used.name, index)
-            runs.write_frame(folder, frame)
-            if pictures:
-                from ..plot import write_pictures
-
-                write_pictures(folder, frame, title=f"{adc.name} ({used.name}), frame {index}")
-            records.append(runs.frame_summary(frame))
-            step(advance=1)
-        summary = _summary(adc, used, records)
+    with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
+        summary = _render(adc, cubes, wanted, frame_period_s, place.partial, pictures=pictures, quiet=json_)
         runs.write_json(place.partial / "summary.json", summary)
-        _write_config(place.partial / "config.yaml", adc, used, _Format(layout, level, swap_iq))
+        _write_config(place.partial / "config.yaml", adc, used, form)
     if json_:
         print_json(summary)
     else:
@@ -133,9 +119,33 @@ def process(
     return 0
 
 
-def _summary(adc: Path, used: RadarProfile, records: list[dict[str, Any]]) -> dict[str, Any]:
+def _render(
+    adc: Path,
+    cubes: Sequence[AdcCube],
+    wanted: range,
+    period_s: float | None,
+    root: Path,
+    *,
+    pictures: bool,
+    quiet: bool,
+) -> dict[str, Any]:
+    """Write every frame and return the summary."""
+    from .. import runs
     from . import _version
 
+    used = cubes[0].profile
+    records, last = [], None
+    with progress(len(wanted), "processing", quiet=quiet) as step:
+        for index in wanted:
+            frame = last = _frame(cubes[index], index, period_s, last)
+            folder = runs.frame_folder(root, used.name, index)
+            runs.write_frame(folder, frame)
+            if pictures:
+                from ..plot import write_pictures
+
+                write_pictures(folder, frame, title=f"{adc.name} ({used.name}), frame {index}")
+            records.append(runs.frame_summary(frame))
+            step(advance=1)
     radar = {"name": used.name, "profile": used.name, "frames": records}
     return {"version": _version(), "source": str(adc), "backend": None, "seed": None, "radars": [radar]}
 

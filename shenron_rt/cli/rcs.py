@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import functools
 import re
-import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .common import Json, Output, Overwrite, print_json, progress, say
-from .rcs_options import PARTS, RcsOptions, load_target, read_pair, read_permittivity
-
-if TYPE_CHECKING:
-    from ..rcs import RcsSweep
-    from ..scene.mesh import TaggedMesh
-    from ..turntable import Convergence, SweepPlan
+from .common import Json, Output, Overwrite, check_seed, print_json, say
+from .rcs_job import RcsJob
+from .rcs_options import PARTS, RcsOptions, read_pair, read_permittivity
 
 __all__ = ["rcs"]
 
@@ -108,60 +101,32 @@ def rcs(
         Ray tracing backend: auto is cuda, then llvm, then scalar.
     """
     from .. import runs
-    from ..turntable.plan import check_plan, plan_sweep
+    from .rcs_output import show_summary
 
     options = _options(
         freq_ghz, az, el, pol, distance_m, max_bounces, rays_per_wavelength, bistatic, material, permittivity, seed,
         backend,
     )  # fmt: skip
     _positive(target_error_db=target_error_db, window_deg=window_deg, max_seconds=max_seconds)
-    arguments = options.arguments()
     if output is not None and not plan:
         runs.check_target(output, overwrite)
-    name, mesh = load_target(
-        target, mesh_frame=mesh_frame, units=units, parts=options.material is None, manifest=manifest
-    )
-    with progress(1, "trying a few aspects", quiet=json_):
-        planned = cost = plan_sweep(mesh, **arguments)
-        if converge or target_error_db is not None:
-            cost = planned + plan_sweep(mesh, **options.doubled().arguments())
+    job = RcsJob(
+        target, mesh_frame, units, manifest, options, converge=converge, target_error_db=target_error_db,
+        max_seconds=None if yes else max_seconds, window_deg=window_deg, pictures=pictures, quiet=json_,
+    )  # fmt: skip
     if plan:
-        print_json(cost.to_dict()) if json_ else say(f"{name}: {cost}")
+        print_json(job.cost.to_dict()) if json_ else say(f"{job.name}: {job.cost}")
         return 0
-    check_plan(cost, float("inf") if yes else max_seconds)
-    study = Study(converge, target_error_db, None if yes else max_seconds)
-    default = functools.partial(runs.default_folder, _label(name), f"rcs-{_band(arguments['frequency_hz'])}ghz")
+    job.check()
+    default = functools.partial(runs.default_folder, _label(job.name), f"rcs-{_band(options)}ghz")
     with runs.write_run(output or default(), overwrite=overwrite, another=None if output else default) as place:
-        if not json_:
-            say(f"{name}: {cost}")
-        started = clock.perf_counter()
-        sweep, report = _sweep(name, mesh, options, study, planned, quiet=json_)
-        seconds = clock.perf_counter() - started
-        from .rcs_output import show_summary, write_results
-
-        facts = {
-            "target": name, "seconds": seconds, "settings": options.record(), "plan": cost.to_dict(),
-            "convergence": None if report is None else report.to_dict(),
-        }  # fmt: skip
-        source = {"target": _located(target), "mesh_frame": mesh_frame, "units": units, "manifest": manifest}
-        summary = write_results(
-            place.partial, sweep, mesh, facts, source, window_deg=window_deg, report=report, pictures=pictures
-        )
+        summary = job.run(place.partial)
     if json_:
         print_json(summary)
     else:
         show_summary(summary)
-        say(f"{place.folder}: written, swept in {seconds:.1f} s, {summary['backend']} backend")
+        say(f"{place.folder}: written, swept in {summary['seconds']:.1f} s, {summary['backend']} backend")
     return 0
-
-
-@dataclass(frozen=True)
-class Study:
-    """Whether and how far to refine."""
-
-    converge: bool
-    target_error_db: float | None
-    max_seconds: float | None
 
 
 def _options(
@@ -178,8 +143,6 @@ def _options(
     seed: int,
     backend: str,
 ) -> RcsOptions:
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
     return RcsOptions(
         freq_ghz=freq_ghz,
         az=az,
@@ -191,7 +154,7 @@ def _options(
         bistatic=None if bistatic is None else read_pair("bistatic", bistatic),
         material=None if material == PARTS else material,
         permittivity=None if permittivity is None else read_permittivity(permittivity),
-        seed=seed,
+        seed=check_seed(seed),
         backend=backend,
     )
 
@@ -202,56 +165,12 @@ def _positive(**options: float | None) -> None:
             raise InputError(f"--{name.replace('_', '-')} {value:g}: more than 0 is needed")
 
 
-def _sweep(
-    name: str, mesh: TaggedMesh, options: RcsOptions, study: Study, planned: SweepPlan, *, quiet: bool
-) -> tuple[RcsSweep, Convergence | None]:
-    """Return the (finest) sweep, and the report where densities are compared."""
-    from ..rcs import sweep_rcs
-    from ..turntable.convergence import converge
-
-    with progress(100, "sweeping", quiet=quiet) as step:
-        bar = _Bar(step, f"sweeping, % done of about {planned.seconds:.0f} s")
-        if not (study.converge or study.target_error_db is not None):
-            return replace(sweep_rcs(mesh, **options.arguments(), progress=bar.show), target=name), None
-
-        def before(density: float, expected: float | None) -> None:
-            bar.restart(f"{density:g} rays per wavelength, % done of about {expected or planned.seconds:.0f} s")
-
-        report = converge(
-            mesh, target_error_db=study.target_error_db, max_seconds=study.max_seconds, before=before,
-            progress=bar.show, **options.arguments(),
-        )  # fmt: skip
-    return replace(report.finest, target=name), report
-
-
-class _Bar:
-    """A progress bar that is told shares."""
-
-    def __init__(self, step: Callable[..., None], what: str) -> None:
-        self._step, self._what, self._shown = step, what, 0
-
-    def restart(self, what: str) -> None:
-        """Begin a next part."""
-        self._what = what
-        self.show(0.0)
-
-    def show(self, share: float) -> None:
-        """Fill the bar so far."""
-        percent = int(100.0 * share)
-        self._step(self._what, advance=percent - self._shown)
-        self._shown = percent
-
-
 def _label(name: str) -> str:
     """Return a name for a folder: ``plate-0.05x0.05`` of ``plate:0.05x0.05``."""
     return re.sub(r"[^\w.]+", "-", Path(name).stem if "/" in name else name).strip("-")
 
 
-def _band(frequency_hz: list[float]) -> str:
+def _band(options: RcsOptions) -> str:
+    frequency_hz = options.arguments()["frequency_hz"]
     ends = sorted({f"{f / 1e9:g}" for f in (min(frequency_hz), max(frequency_hz))}, key=float)
     return "-".join(ends)
-
-
-def _located(target: str) -> str:
-    file = Path(target)
-    return str(file.resolve()) if file.is_file() else target

@@ -18,6 +18,7 @@ from .common import (
     Overwrite,
     ProfileNames,
     SetOptions,
+    check_seed,
     frame_range,
     print_json,
     progress,
@@ -93,7 +94,9 @@ def run(
     options = merge_options({"max_bounces": loaded.max_bounces, **loaded.run}, given)
     keep = parts_of(write)
     loaded = with_profiles(loaded, profile or [], overrides.profile)
-    loaded = loaded.model_copy(update={"seed": loaded.seed if seed is None else _seed(seed), "run": options.record()})
+    loaded = loaded.model_copy(
+        update={"seed": loaded.seed if seed is None else check_seed(seed), "run": options.record()}
+    )
     if not loaded.radars:
         raise InputError(f"{scene}: the scene has no radars; give it at least one under radars:")
     default = partial(runs.default_folder, loaded.name, profile_label(loaded))
@@ -110,12 +113,6 @@ def run(
         show_run(summary)
         say(f"{place.folder}: written in {clock.perf_counter() - started:.1f} s, {summary['backend']} backend")
     return 0
-
-
-def _seed(seed: int) -> int:
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a whole number from 0 up is needed")
-    return seed
 
 
 def _render(

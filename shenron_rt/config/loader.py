@@ -127,16 +127,10 @@ def _message(model: type[BaseModel], source: str, node: yaml.Node | None, error:
     return f"{where}: {key}: {what}{shown}{hint}"
 
 
-def validate_model(
-    model: type[Model],
-    data: Mapping[str, Any],
-    source: str,
-    node: yaml.Node | None = None,
-    context: Mapping[str, Any] | None = None,
-) -> Model:
+def validate_model(model: type[Model], data: Mapping[str, Any], source: str, node: yaml.Node | None = None) -> Model:
     """Build a model from plain data, or raise one :class:`ConfigError` that lists every problem, one a line."""
     try:
-        return model.model_validate(data, context=dict(context or {}))
+        return model.model_validate(data)
     except ValidationError as error:
         raise ConfigError("\n".join(_message(model, source, node, e) for e in error.errors())) from None
 

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from ..constants import DEFAULT_MOUNT_XYZ, MOST_SCENE_BOUNCES
 from ..errors import InputError, did_you_mean
-from ..resources import find, package_folder
+from ..resources import find
 from ..scatterers import Weather
 from ..scene.mesh import TaggedMesh
 from ..tags import SemanticTag
@@ -317,8 +317,3 @@ def load_scene(name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any
     data, node = read_yaml(file)
     data = {"name": file.stem, **apply_overrides(data, overrides or {}), "folder": file.parent}
     return validate_model(Scene, data, str(file), node)
-
-
-def scenes_folder() -> Path:
-    """Return the folder of the bundled scenes."""
-    return package_folder("scenes")

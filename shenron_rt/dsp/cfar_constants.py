@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 
-__all__ = ["CFAR_KINDS", "CfarKind", "cfar_alpha", "cfar_pfa", "os_rank"]
+__all__ = ["CfarKind", "cfar_alpha", "cfar_pfa", "os_rank"]
 
 CfarKind = Literal["ca", "go", "so", "os"]
-CFAR_KINDS: tuple[str, ...] = get_args(CfarKind)
 #: Rank of the ordered statistic as a part of the training cells (Rohling's choice).
 OS_RANK_PART = 0.75
 

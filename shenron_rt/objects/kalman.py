@@ -6,7 +6,7 @@ import numpy as np
 
 from .._typing import FloatArray
 
-__all__ = ["constant_velocity", "predict", "steady_state_gain", "update"]
+__all__ = ["constant_velocity", "predict", "update"]
 
 
 def constant_velocity(step_s: float, acceleration_std: float, dimensions: int = 2) -> tuple[FloatArray, FloatArray]:
@@ -64,20 +64,3 @@ def update(
     K = np.linalg.solve(S, H @ P).T
     left = np.eye(len(x)) - K @ H
     return x + K @ innovation, left @ P @ left.T + K @ R @ K.T
-
-
-def steady_state_gain(tracking_index: float) -> tuple[float, float]:
-    """Return (alpha, beta): the gains of position and (over T) velocity that the filter settles at.
-
-    Parameters
-    ----------
-    tracking_index : float
-        Lambda = acceleration_std T^2 / measurement_std, > 0.
-
-    References
-    ----------
-    .. [1] P. R. Kalata, IEEE Trans. Aerosp. Electron. Syst. AES-20, 174-182 (1984), doi:10.1109/TAES.1984.310438.
-    """
-    r = (4 + tracking_index - np.sqrt(8 * tracking_index + tracking_index**2)) / 4
-    alpha = 1 - r**2
-    return float(alpha), float(2 * (2 - alpha) - 4 * np.sqrt(1 - alpha))

@@ -15,7 +15,7 @@ from .top_view import top_view
 from .truth import truth_of
 
 if TYPE_CHECKING:
-    from ..runs import FrameLike
+    from ..run_summary import FrameLike
 
 __all__ = ["write_pictures"]
 

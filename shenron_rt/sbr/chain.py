@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from .._parallel import map_blocks
 from .._typing import BoolArray, FloatArray, IntArray, NDArray
 from .surface import Surface
+from .vectors import dot, mirrored
 from .views import Rays, Views
 
-__all__ = ["Bounce", "Chain", "alike", "dot", "mirrored", "sees", "trace_chain"]
+__all__ = ["Bounce", "Chain", "sees", "trace_chain"]
 
 #: Multiplier of the hash of a chain of surfaces (the golden ratio times 2^64).
 _MIX = np.uint64(0x9E3779B97F4A7C15)
@@ -67,26 +67,6 @@ class Chain:
     rays: Rays
     bounces: tuple[Bounce, ...]
     signature: NDArray[np.uint64]
-
-
-def dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Return the (n,) scalar products of rows, complex ones unconjugated."""
-    result: NDArray[Any] = a[:, 0] * b[:, 0]
-    result += a[:, 1] * b[:, 1]
-    result += a[:, 2] * b[:, 2]
-    return result
-
-
-def alike(values: NDArray[Any]) -> BoolArray:
-    """Return (n,) whether the four numbers of a row are equal; NumPy reduces along short rows slowly."""
-    first, second, third, fourth = values.T
-    same: BoolArray = (first == second) & (second == third) & (third == fourth)
-    return same
-
-
-def mirrored(vector: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return (n, 3) vectors as the mirror with a unit normal shows them."""
-    return vector - 2.0 * dot(vector, normal)[:, None] * normal
 
 
 def trace_chain(surface: Surface, views: Views, rays: Rays, max_bounces: int, monostatic: bool = True) -> Chain:

@@ -15,7 +15,7 @@ import numpy as np
 from .._parallel import map_blocks
 from .._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .chain import Bounce, Chain, dot
+from .chain import Bounce, Chain
 from .fields import Fields, fields_along, radiated
 from .parts import Parts, facet_parts
 from .polygon import polygon_integral
@@ -23,6 +23,7 @@ from .sight import HIDDEN, LIMB, PARTLY, WHOLE, Sight
 from .sums import by_view
 from .surface import Surface
 from .tubes import receive_basis
+from .vectors import dot
 from .views import Rays, Views
 
 __all__ = ["facet_echoes"]

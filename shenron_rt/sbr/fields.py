@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .._typing import ComplexArray, FloatArray, NDArray
-from .chain import Bounce, Chain, dot
+from .chain import Bounce, Chain
 from .surface import Reflector, Surface
+from .vectors import dot
 from .views import Views
 
 __all__ = ["Fields", "fields_along", "radiated", "reflected_field"]

@@ -14,10 +14,11 @@ import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray, NDArray
 from .cells import Cells, Lattice
-from .chain import Chain, dot, trace_chain
+from .chain import Chain, trace_chain
 from .fields import Fields, radiated
 from .surface import Surface
 from .tubes import PAIRS, in_line, receive_basis
+from .vectors import dot
 from .views import Views
 
 __all__ = ["Echoes", "Pieces", "Rim"]

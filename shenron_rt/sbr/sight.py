@@ -10,9 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from .._typing import FloatArray, IntArray, NDArray
-from .chain import dot, sees
+from .chain import sees
 from .subdivide import shortened
 from .surface import Surface
+from .vectors import dot
 from .views import Views
 
 __all__ = ["HIDDEN", "LIMB", "PARTLY", "WHOLE", "Sight", "heights"]

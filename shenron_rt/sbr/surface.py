@@ -13,6 +13,7 @@ from ..scene.mesh import TaggedMesh
 from ..scene.smooth import connected, smooth_groups
 from ..tracing.backend import Backend
 from ..tracing.caster import RayCaster
+from .vectors import dot
 
 __all__ = ["Reflector", "Surface"]
 
@@ -74,7 +75,7 @@ class Surface:
     @functools.cached_property
     def radius(self) -> float:
         """Largest distance of a vertex from the centre [m]."""
-        return float(np.sqrt(_dot(self.points, self.points).max()))
+        return float(np.sqrt(dot(self.points, self.points).max()))
 
     @functools.cached_property
     def normal(self) -> FloatArray:
@@ -99,7 +100,7 @@ class Surface:
         if 2 * len(a) != 3 * n or connected(a, b, n).any():
             return 0
         middle = self.mesh.vertices[self.mesh.faces].mean(axis=1)
-        bend = np.concatenate([_dot(normal[a], middle[b] - middle[a]), _dot(normal[b], middle[a] - middle[b])])
+        bend = np.concatenate([dot(normal[a], middle[b] - middle[a]), dot(normal[b], middle[a] - middle[b])])
         for sign in (1, -1):  # a closed surface that bends inwards across every edge is that of a convex body
             if (sign * bend <= _FLAT * self.radius).all():
                 return sign
@@ -140,7 +141,3 @@ class Surface:
     def conducts(self) -> bool:
         """Whether every face is a smooth perfect conductor."""
         return all(r.coefficients is None and r.roughness_m == 0.0 for r in self.reflectors)
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

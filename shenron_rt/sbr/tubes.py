@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from .._typing import BoolArray, FloatArray, IntArray, NDArray
-from .chain import Bounce, Chain, alike, dot
+from .chain import Bounce, Chain
 from .fields import Fields, radiated
+from .vectors import alike, dot
 from .views import Views
 
 __all__ = ["PAIRS", "footprint", "in_line", "is_tube", "receive_basis", "tube_echoes"]

@@ -64,7 +64,6 @@ def bounced_paths(
     launches: list[Launch],
     parts: list[IntArray],
     hits: list[IntArray],
-    aimed: list[int],
     images: list[Image],
     max_bounces: int,
     wavenumber: float,

@@ -112,7 +112,7 @@ def trace(
     if max_bounces > 1:
         wavenumber = 2.0 * np.pi / profile.wavelength_m
         image = image_launches(world, caster, aimed, run_seed, frame, mount.name)
-        bounced = bounced_paths(world, caster, launches, parts, hits, list(aimed), image, max_bounces, wavenumber)
+        bounced = bounced_paths(world, caster, launches, parts, hits, image, max_bounces, wavenumber)
         bounced = Paths.join([bounced, point_paths(world, caster, points, max_bounces)])
     return Scatterers(
         **columns,

@@ -68,13 +68,11 @@ class RawPoints:
         return len(self.xyz)
 
 
-def record_points(records: NDArray[Any], layout: str, notes: tuple[str, ...] = ()) -> RawPoints:
+def record_points(records: NDArray[Any], layout: str) -> RawPoints:
     """Return the columns of an array of :data:`RECORD`."""
     xyz = np.stack([records[axis] for axis in "xyz"], axis=1).astype(np.float64)
     cos = records["CosAngle"].astype(np.float64)
-    return RawPoints(
-        xyz, cos, records["ObjIdx"].astype(np.uint32), records["ObjTag"].astype(np.uint32), layout, None, notes
-    )
+    return RawPoints(xyz, cos, records["ObjIdx"].astype(np.uint32), records["ObjTag"].astype(np.uint32), layout, None)
 
 
 def from_fields(file: Path, fields: dict[str, NDArray[Any]], layout: str) -> RawPoints:

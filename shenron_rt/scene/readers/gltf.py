@@ -23,7 +23,6 @@ from ._raw import RawMesh, as_float64, placed, read_bytes
 __all__ = ["read_gltf"]
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-_KNOWN_EXTENSIONS = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _MAX_DEPTH = 200
 
