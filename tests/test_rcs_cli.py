@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 import shenron_rt as srt
@@ -188,6 +189,32 @@ def test_a_plan_is_printed_and_nothing_else_happens(capsys: pytest.CaptureFixtur
     assert plan["aspects"] == 81
     assert 0 < plan["seconds"] < 60
     assert list(Path().iterdir()) == []
+
+
+def test_coarse_round_targets_can_be_rounded(tmp_path: Path) -> None:
+    """A ball of 320 facets scatters like a ball, and the run says that it was rounded."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
+    ball.export(tmp_path / "ball.stl")
+    at = (
+        "rcs",
+        str(tmp_path / "ball.stl"),
+        "--freq-ghz",
+        "24",
+        "--az",
+        "0:30:10",
+        "--max-bounces",
+        "1",
+        "--no-pictures",
+    )
+    levels = {}
+    for word, more in (("coarse", ()), ("round", ("--round-below-deg", "30"))):
+        assert main([*at, *more, "-o", word]) == 0
+        levels[word] = 10 ** (np.load(f"{word}/rcs.npz")["rcs_dbsm"].ravel() / 10) / (np.pi * 0.1**2)
+    # facets of 30 mm within lambda / 256 of the ball, off by 0.05 rad at most: 0.2 dB; ka = 50 leaves 0.2 dB more
+    assert np.abs(10 * np.log10(levels["round"])).max() < 0.4
+    assert np.abs(10 * np.log10(levels["coarse"])).max() > 1.0
+    recorded = yaml.safe_load(Path("round/config.yaml").read_text())
+    assert recorded["rcs"]["round_below_deg"] == 30.0
 
 
 def test_a_run_that_would_take_too_long_is_refused_unless_it_is_meant(capsys: pytest.CaptureFixture[str]) -> None:

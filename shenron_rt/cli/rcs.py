@@ -37,6 +37,7 @@ def rcs(
     permittivity: str | None = None,
     mesh_frame: str = "ros_z_up",
     units: str = "m",
+    round_below_deg: float | None = None,
     manifest: Annotated[Path | None, Parameter(name=["--manifest", "--resolve"])] = None,
     converge: Annotated[bool, Parameter(negative=())] = False,
     target_error_db: float | None = None,
@@ -81,6 +82,8 @@ def rcs(
         Axes of a mesh file, for example carla_exporter.
     units
         Of a mesh file: m, cm, mm, inch, or metres per unit.
+    round_below_deg
+        Round what facets meeting at less than this stand for, say 30, to wavelength / 256. Default: facets are facets.
     manifest
         Sidecar YAML of tags and materials, for --material parts.
     converge
@@ -107,12 +110,15 @@ def rcs(
         freq_ghz, az, el, pol, distance_m, max_bounces, rays_per_wavelength, bistatic, material, permittivity, seed,
         backend,
     )  # fmt: skip
-    _positive(target_error_db=target_error_db, window_deg=window_deg, max_seconds=max_seconds)
+    _positive(
+        target_error_db=target_error_db, window_deg=window_deg, max_seconds=max_seconds, round_below_deg=round_below_deg
+    )  # fmt: skip
     if output is not None and not plan:
         runs.check_target(output, overwrite)
     job = RcsJob(
         target, mesh_frame, units, manifest, options, converge=converge, target_error_db=target_error_db,
-        max_seconds=None if yes else max_seconds, window_deg=window_deg, pictures=pictures, quiet=json_,
+        max_seconds=None if yes else max_seconds, window_deg=window_deg, round_below_deg=round_below_deg,
+        pictures=pictures, quiet=json_,
     )  # fmt: skip
     if plan:
         print_json(job.cost.to_dict()) if json_ else say(f"{job.name}: {job.cost}")

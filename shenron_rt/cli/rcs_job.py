@@ -9,6 +9,7 @@ from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..constants import SPEED_OF_LIGHT
 from .common import progress, say
 from .rcs_options import RcsOptions, load_target
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from ..turntable import Convergence, SweepPlan
 
 __all__ = ["RcsJob"]
+
+#: Wavelengths over how far facets may lie from a round surface: 0.05 rad of phase there and back.
+_ROUND = 256.0
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class RcsJob:
         Longest run; None is without limit [s].
     window_deg : float or None
         Of the statistics [deg].
+    round_below_deg : float or None
+        Facets that meet at less are rounded; None leaves them [deg].
     pictures, quiet : bool
     """
 
@@ -51,15 +57,22 @@ class RcsJob:
     target_error_db: float | None
     max_seconds: float | None
     window_deg: float | None
+    round_below_deg: float | None
     pictures: bool
     quiet: bool
 
     @functools.cached_property
     def _loaded(self) -> tuple[str, TaggedMesh]:
+        from ..scene.rounding import round_mesh
+
         parts = self.options.material is None
-        return load_target(
+        name, mesh = load_target(
             self.target, mesh_frame=self.mesh_frame, units=self.units, parts=parts, manifest=self.manifest
         )
+        if self.round_below_deg is not None:
+            shortest = SPEED_OF_LIGHT / max(self.options.arguments()["frequency_hz"])
+            mesh = round_mesh(mesh, shortest / _ROUND, below_deg=self.round_below_deg)
+        return name, mesh
 
     @property
     def name(self) -> str:
@@ -108,7 +121,7 @@ class RcsJob:
         }  # fmt: skip
         source = {
             "target": _located(self.target), "mesh_frame": self.mesh_frame, "units": self.units,
-            "manifest": self.manifest,
+            "manifest": self.manifest, "round_below_deg": self.round_below_deg,
         }  # fmt: skip
         return write_results(
             root, sweep, self._loaded[1], facts, source, window_deg=self.window_deg, report=report,
