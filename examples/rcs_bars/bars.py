@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +18,11 @@ from shenron_rt.rcs import DEFAULT_RAYS_PER_WAVELENGTH
 #: mean, max: of |error|; at: |error| of one sample, the peak or boresight; median: error of the median level; highest:
 #: the largest value itself, where a level is the result.
 Statistic = Literal["mean", "max", "at", "median", "highest"]
+
+
+@functools.lru_cache(maxsize=64)
+def _shared(target: Any, options: tuple[tuple[str, Any], ...]) -> srt.RcsSweep:
+    return srt.sweep_rcs(target, **dict(options))
 
 
 @dataclass(frozen=True)
@@ -42,10 +48,13 @@ class Run:
         return slice(None, None, step if self.quick else 1)
 
     def sweep(self, target: Any, **options: Any) -> srt.RcsSweep:
-        """Call ``sweep_rcs`` at the run's ray spacing."""
+        """Call ``sweep_rcs`` at the run's ray spacing; quick runs, which nobody times, share sweeps among bars."""
         if self.finer:
             options["rays_per_wavelength"] = 2.0 * DEFAULT_RAYS_PER_WAVELENGTH
-        return srt.sweep_rcs(target, **options)
+        if not self.quick:
+            return srt.sweep_rcs(target, **options)
+        plain = ((k, tuple(v.tolist()) if isinstance(v, np.ndarray) else v) for k, v in options.items())
+        return _shared(target, tuple(plain))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,12 +159,16 @@ class Bar:
     needs: str | None = "reference"
 
     def figures(self, shared: Path, *, quick: bool) -> tuple[list[Figure], float]:
-        """Measure all limits; return them and the wall time at the default spacing [s]."""
+        """Measure all limits; return them and the wall time at the default spacing [s].
+
+        Quick runs cast finer rays only where a limit asks what these change.
+        """
         started = time.perf_counter()
         cuts = self.measure(Run(shared, quick))
         seconds = time.perf_counter() - started
         limits = self.limits(shared) if callable(self.limits) else self.limits
-        finer = self.measure(Run(shared, quick, finer=True)) if self.rays else None
+        asked = not quick or any(x.steady and x.most is not None for x in limits)
+        finer = self.measure(Run(shared, quick, finer=True)) if self.rays and asked else None
         figures = [Figure(x, x.value(cuts), None if finer is None else x.change(cuts, finer)) for x in limits]
         return figures, seconds
 

@@ -27,6 +27,7 @@ CUTS = {"triangular_100mm_77GHz": 0.1, "triangular_150mm_24GHz": 0.15, "square_5
 LEGS = {"triangular": 0.1, "square": 0.05, "circular": 0.08}
 
 
+@functools.cache
 def in_table_frame(kind: str, leg: float) -> TaggedMesh:
     """Return a trihedral whose plates lie in the coordinate planes."""
     return make_shape(f"trihedral:{kind},a={leg}").transformed(TO_TABLE)
@@ -92,11 +93,11 @@ def table_cuts(run: Run, name: str, column_of: Callable[[str], str], cross: bool
     cuts = []
     for cut, axis in (("az", "az_deg"), ("el", "el_deg")):
         table = columns(run.shared / f"reference/rcs/trihedral_{name}_{cut}.csv")
-        table = {key: column[run.thin(5 if cross else 9)] for key, column in table.items()}
-        pols = ("HV",) if cross else ("VV", "HH")
+        table = {key: column[run.thin(9)] for key, column in table.items()}
+        pols = ("VV", "HH", "HV")  # one sweep for the bars of both
         got = along(run, in_table_frame(kind, CUTS[name]), float(ghz[:-3]), table, pols)
         middle = int(np.abs(table[axis] - (45.0 if cut == "az" else TILT_DEG)).argmin())
-        cuts += [Cut(got[:, n], table[column_of(p)], middle) for n, p in enumerate(pols)]
+        cuts += [Cut(got[:, n], table[column_of(p)], middle) for n, p in enumerate(pols) if (p == "HV") == cross]
     return [c for c in cuts if c.want.max() > -110.0]  # the cut through the plane of symmetry has no cross-polar echo
 
 
@@ -108,13 +109,14 @@ def random_directions(run: Run, kind: str, ghz: float, cross: bool) -> list[Cut]
     azimuth = np.concatenate([[45.0], rng.uniform(2.0, 88.0, count)])
     elevation = np.concatenate([[TILT_DEG], rng.uniform(2.0, 85.0, count)])
     want = exact_matrix(kind, leg, lam, np.radians(azimuth), np.radians(elevation))
-    pols = ("HV", "VH") if cross else ("VV", "HH")
+    pols = ("VV", "HH", "HV", "VH")  # one sweep for the bars of both
     got = run.sweep(
         in_table_frame(kind, leg), frequency_hz=ghz * 1e9, azimuth_deg=azimuth, elevation_deg=elevation,
         polarization=pols,
     ).rcs_dbsm  # fmt: skip
     pick = {"VV": (0, 0), "HH": (1, 1), "HV": (1, 0), "VH": (0, 1)}
-    return [Cut(got[0, :, :, n].ravel(), dbsm(want[(..., *pick[p])]).ravel()) for n, p in enumerate(pols)]
+    asked = pols[2:] if cross else pols[:2]
+    return [Cut(got[0, :, :, pols.index(p)].ravel(), dbsm(want[(..., *pick[p])]).ravel()) for p in asked]
 
 
 def full_wave(run: Run, lambdas: int, boresight: bool) -> list[Cut]:
