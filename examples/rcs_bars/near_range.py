@@ -120,7 +120,7 @@ def wall(run: Run, reference: str) -> list[Cut]:
 
     The rim's Fresnel ripple swings with the range; over 24 ranges it averages out to sqrt(2/24) of some 0.3 dB.
     """
-    distance = np.linspace(2.0, 3.0, 24)[run.thin(12) if reference == "plate" else run.thin(1)]
+    distance = np.linspace(2.0, 3.0, 24)[run.thin(24) if reference == "plate" else run.thin(1)]
     got = np.array(
         [
             run.sweep("plate:5x5", frequency_hz=24e9, azimuth_deg=0.0, distance_m=r, max_bounces=1).rcs_dbsm.item()
