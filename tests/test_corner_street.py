@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from corner_tools import four_path_corner
+import yaml
+from corner_tools import corner_scene, four_path_corner
 
 import shenron_rt as srt
 from shenron_rt.cli import main
@@ -58,10 +59,14 @@ def test_the_scene_says_how_many_bounces_it_needs(street: srt.Frame) -> None:
 
 
 def test_the_command_line_takes_the_bounces_of_the_scene_unless_told(tmp_path: Path) -> None:
+    scene = corner_scene(10.0, road=True).model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    scene["actors"][0]["aim"] = 200
+    file = tmp_path / "corner.yaml"
+    file.write_text(yaml.safe_dump(scene | {"version": 1, "max_bounces": 5}))
     for argv, wanted in (((), 5), (("--max-bounces", "1"), 1)):
         folder = tmp_path / str(wanted)
         options = ("-o", str(folder), "--rays", "3000", "--accuracy", "1e-3", "--no-pictures")
-        assert main(["run", "corner_reflector", *options, *argv]) == 0
+        assert main(["run", str(file), *options, *argv]) == 0
         assert json.loads((folder / "summary.json").read_text())["max_bounces"] == wanted
     # what an earlier run was told is kept by its configuration, over the scene's own
     again = tmp_path / "again"
