@@ -137,16 +137,18 @@ def centred(name: str, ghz: float, polarization: str) -> srt.RadarProfile:
     return isotropic(name, polarization, **{"waveform.carrier_hz": carrier})
 
 
+@pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.slow)], ids=["few", "all"])
 @pytest.mark.parametrize("letter", ["V", "H"])
 @pytest.mark.parametrize(("name", "ghz"), [("radarbook_200mhz", 24.125), ("awrl1432_137mhz", 77.0)])
 @pytest.mark.parametrize("ground", ["asphalt", "pec_like"])
 def test_a_point_over_a_ground_keeps_the_table_from_scene_to_detection(
-    ground: str, name: str, ghz: float, letter: str, shared_reference: Path, tmp_path: Path
+    ground: str, name: str, ghz: float, letter: str, step: int, shared_reference: Path, tmp_path: Path
 ) -> None:
+    """Compare the echoes of every row of the table, and the detections of every ``step``-th."""
     materials = tmp_path / "grounds.yaml"
     materials.write_text(GROUNDS)
     profile = centred(name, ghz, 2 * letter)
-    compared = 0
+    compared = detected = 0
     for row in table(shared_reference, ground, ghz):
         wanted = float(row[f"gain_{letter}_db"])
         if wanted <= -10.0:
@@ -156,17 +158,20 @@ def test_a_point_over_a_ground_keeps_the_table_from_scene_to_detection(
         scene = road_scene(profile, radar, materials, ground, point_targets=[point(distance, height)])
         # digits of the table, and its eps for metal, which is a fit
         assert 20 * np.log10(abs(echo_factor(scene, max_bounces=3))) == pytest.approx(wanted, abs=0.01)
-        found = srt.simulate(scene, max_bounces=3, rays=1000, noise=None).detections
+        if compared % step or distance < 5:
+            continue
+        detected += 1
+        found = srt.simulate(scene, max_bounces=3, rays=1000, noise=None, accuracy=1e-3).detections
         mine = found.table[found.object_id == NUMBER][0]
         gain = float(mine["rcs_dbsm"]) - RCS_DBSM
         # Reported range is between the ways, which differ by up to 2 h1 h2 / R in range, and the radar equation is
         # inverted there: at 5 m 0.4 dB of 40 log10, at 3 m above 1 dB, where the ways also start to be told apart.
         if distance >= 8:
             assert gain == pytest.approx(wanted, abs=0.3)
-        if distance >= 5:
-            longer = 40 * np.log10(float(mine["range"]) / np.hypot(distance, radar - height))
-            assert gain - longer == pytest.approx(wanted, abs=0.1)
+        longer = 40 * np.log10(float(mine["range"]) / np.hypot(distance, radar - height))
+        assert gain - longer == pytest.approx(wanted, abs=0.1)
     assert compared > 20
+    assert detected > 15 / step
 
 
 # ---- where the lobes are
@@ -186,7 +191,7 @@ def test_detected_lobes_lie_where_the_closed_form_has_them(polarization: str) ->
     assert [len(w) for w in wanted] == [6, 5]
     for k, places in enumerate(wanted):
         for place in places:
-            near = place * np.linspace(0.98, 1.02, 5)  # steps of 1 %, the bar
+            near = place * np.array([0.98, 1.0, 1.02])  # the middle one is the extreme where it is off by less than 1 %
             # strong, so that in a fade of 50 dB it still stands out of the road
             level = [detected_dbsm(road_scene(profile, 0.6, point_targets=[point(r, 0.3, 80.0)])) for r in near]
             (found,) = extrema(near, np.array(level))[k]
