@@ -9,9 +9,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError
 from .common import Json, Output, Overwrite, check_seed, print_json, say
-from .rcs_job import RcsJob
+from .rcs_job import RcsJob, check_positive
 from .rcs_options import PARTS, RcsOptions, read_pair, read_permittivity
 
 __all__ = ["rcs"]
@@ -110,16 +109,14 @@ def rcs(
         freq_ghz, az, el, pol, distance_m, max_bounces, rays_per_wavelength, bistatic, material, permittivity, seed,
         backend,
     )  # fmt: skip
-    _positive(
-        target_error_db=target_error_db, window_deg=window_deg, max_seconds=max_seconds, round_below_deg=round_below_deg
-    )  # fmt: skip
-    if output is not None and not plan:
-        runs.check_target(output, overwrite)
+    check_positive(max_seconds=max_seconds)
     job = RcsJob(
         target, mesh_frame, units, manifest, options, converge=converge, target_error_db=target_error_db,
         max_seconds=None if yes else max_seconds, window_deg=window_deg, round_below_deg=round_below_deg,
         pictures=pictures, quiet=json_,
     )  # fmt: skip
+    if output is not None and not plan:
+        runs.check_target(output, overwrite)
     if plan:
         print_json(job.cost.to_dict()) if json_ else say(f"{job.name}: {job.cost}")
         return 0
@@ -163,12 +160,6 @@ def _options(
         seed=check_seed(seed),
         backend=backend,
     )
-
-
-def _positive(**options: float | None) -> None:
-    for name, value in options.items():
-        if value is not None and not value > 0.0:
-            raise InputError(f"--{name.replace('_', '-')} {value:g}: more than 0 is needed")
 
 
 def _label(name: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..constants import SPEED_OF_LIGHT
+from ..errors import InputError
 from .common import progress, say
 from .rcs_options import RcsOptions, load_target
 
@@ -18,10 +19,17 @@ if TYPE_CHECKING:
     from ..scene.mesh import TaggedMesh
     from ..turntable import Convergence, SweepPlan
 
-__all__ = ["RcsJob"]
+__all__ = ["RcsJob", "check_positive"]
 
 #: Wavelengths over how far facets may lie from a round surface: 0.05 rad of phase there and back.
 _ROUND = 256.0
+
+
+def check_positive(**options: float | None) -> None:
+    """Refuse values, by the names of their options, that are not more than 0; None is not given."""
+    for name, value in options.items():
+        if value is not None and not value > 0.0:
+            raise InputError(f"--{name.replace('_', '-')} {value:g}: more than 0 is needed")
 
 
 @dataclass(frozen=True)
@@ -60,6 +68,11 @@ class RcsJob:
     round_below_deg: float | None
     pictures: bool
     quiet: bool
+
+    def __post_init__(self) -> None:
+        check_positive(
+            target_error_db=self.target_error_db, window_deg=self.window_deg, round_below_deg=self.round_below_deg
+        )
 
     @functools.cached_property
     def _loaded(self) -> tuple[str, TaggedMesh]:
