@@ -29,7 +29,7 @@ FLOOR_DBSM = -120.0
 DEFAULT_RAYS_PER_WAVELENGTH = 1.0
 #: How often cells that no tube and no clean cut fills may be quartered, by the widest target in cells of the lattice:
 #: a corner is worth it, and costs little; a car has so many that the rest of their cells average out.
-_LEVELS = ((160.0, 5), (320.0, 2), (700.0, 1), (math.inf, 0))
+_LEVELS = ((160.0, 5), (450.0, 2), (700.0, 1), (math.inf, 0))
 MOST_BOUNCES = 10
 #: Near the radar cells are no wider than sqrt(lambda R / 512): at an edge the front within half a cell counts as flat,
 #: and bends by lambda / 4096. A null of a trihedral at 1 m, 20 dB down, is off by 0.5 dB with cells of 24 GHz's lambda.
