@@ -200,10 +200,15 @@ class _Bench:
         least = _LEAST_ASPECTS if one.seconds < _LONG_SECONDS else 2
         grid = self.grid(max(int(_TRIAL_SECONDS / max(one.seconds, 1e-4)), least))
         many = self.run(grid, few)
-        if many.seconds < _SHORT_SECONDS:
-            many = min(many, self.run(grid, few), key=lambda t: t.seconds)
+        a_batch = max(1, int(np.ceil(CHUNK / max(cells_an_aspect, 1.0))))
+        if many.seconds < _SHORT_SECONDS:  # aspects share the fixed costs of a batch: fill one, or try these again
+            tried = len(grid[0]) * len(grid[1])
+            again = self.grid(min(max(tried, a_batch), max(tried, int(tried * _TRIAL_SECONDS / many.seconds))))
+            larger = self.run(again, few)
+            if larger.seconds / larger.share < many.seconds / many.share:
+                grid, many = again, larger
         seconds, rays = many.seconds / many.share, many.rays / many.share
-        batch = grid[0][:1], grid[1][: max(1, int(np.ceil(CHUNK / max(cells_an_aspect, 1.0))))]
+        batch = grid[0][:1], grid[1][:a_batch]
         traced = self.run(batch, few, traced=True)
         # memory grows until a batch of cells is full
         full = min(1.0 / traced.share, max(CHUNK / (len(batch[1]) * cells_an_aspect), 1.0))
