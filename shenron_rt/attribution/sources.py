@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..config.scene import Scene, load_scene
+from ..config.scene import Scene
 from ..dsp import Detections, RadarCube
 from ..errors import InputError
 from ..returns import Returns
+from ..run_source import scene_of
 from ..runs import Run, load_run
 from ..scatterers import Scatterers
 from ..synthesis import AdcCube
@@ -138,10 +139,4 @@ def _of_folder(folder: Path, radar: str, index: int, record: Mapping[str, Any], 
 
 def _scene(config: Path) -> Scene | None:
     """Return the scene behind a run, or None where it came from a LiDAR."""
-    import yaml
-
-    try:
-        data = yaml.safe_load(config.read_text(encoding="utf-8"))
-    except (FileNotFoundError, yaml.YAMLError):
-        return None
-    return load_scene(config) if isinstance(data, dict) and "radars" in data else None
+    return scene_of(config) if config.is_file() else None

@@ -13,10 +13,10 @@ from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Scene
 from ..errors import ShenronError
 from ..plot.top_view import feature_edges
+from ..run_source import RunRadar
 from ..scene.bodies import Body, load_bodies
 from ..scene.world import build_world
 from .arrays import Arrays
-from .source import RadarFiles
 
 __all__ = ["Middles", "SceneMeshes"]
 
@@ -77,7 +77,7 @@ class SceneMeshes:
         mesh_of = tuple(order[id(b.mesh), b.tag.tobytes()] for b in bodies)
         return cls(scene, bodies, materials, mesh_of, records)
 
-    def add_poses(self, arrays: Arrays, prefix: str, radar: RadarFiles) -> tuple[list[dict[str, Any]], Middles]:
+    def add_poses(self, arrays: Arrays, prefix: str, radar: RunRadar) -> tuple[list[dict[str, Any]], Middles]:
         """Add where bodies and radar stand in every frame; return the bodies, and the middles of those with an id.
 
         Parameters
@@ -87,7 +87,7 @@ class SceneMeshes:
             those of a body from its row ``pose`` on, and ``<prefix>.radar``, (frames, 15): those of the radar, and its
             velocity (3).
         prefix : str
-        radar : RadarFiles
+        radar : RunRadar
         """
         mount = self.scene.radar(radar.name)
         first = np.concatenate([[0], np.cumsum([len(b.links) for b in self.bodies])]).astype(np.int64)
