@@ -18,7 +18,7 @@ from .config.profile import RadarProfile
 from .config.scene import Scene, load_scene
 from .constants import DEFAULT_MOUNT_XYZ
 from .dsp import Detections, RadarCube
-from .errors import ConfigError, InputError, NotFoundError, did_you_mean
+from .errors import ConfigError, InputError, NotFoundError
 from .frames import Pose
 from .io.npz import load_npz
 from .returns import Returns
@@ -197,7 +197,7 @@ class RunSource:
         known = {r.name: r for r in self.radars}
         for name in radars or ():
             if name not in known:
-                raise InputError(f"{self.root}: no radar {name!r}; {did_you_mean(name, list(known))}")
+                raise InputError(f"{self.root}: no radar {name!r} in this run; it has {', '.join(known)}")
         chosen = [known[name] for name in dict.fromkeys(radars or known)]
         if frames is not None:
             chosen = [replace(r, frames=tuple(f for f in r.frames if f.index in frames)) for r in chosen]

@@ -110,7 +110,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--to", "csv", "--radar", "rear"], "no radar 'rear'; known: front"),
+        (["--to", "csv", "--radar", "rear"], "no radar 'rear' in this run; it has front"),
         (["--to", "csv", "--frames", "7:9"], "no frames of 7:9; it has 0:3"),
         (["--to", "csv", "--lidar"], "--lidar: --to csv has no such option; it is for mcap and ros2"),
         (["--to", "zarr", "--text"], "--text: --to zarr has no such option; it is for pcd and ply"),

@@ -175,6 +175,18 @@ def test_track_prints_what_each_track_follows(run: Path, tmp_path: Path, capsys:
     assert main(["track", str(run), "-o", str(tmp_path / "tracks")]) == 2  # not empty
 
 
+def test_a_lean_run_is_tracked_as_the_whole_one_and_a_leaner_says_what_it_needs(run: Path, tmp_path: Path) -> None:
+    again = ["run", str(run / "config.yaml"), "--no-pictures", "-o"]
+    assert main([*again, str(tmp_path / "lean"), "--write", "detections,returns,maps"]) == 0
+    assert main(["track", str(tmp_path / "lean"), "-o", str(tmp_path / "a")]) == 0
+    assert main(["track", str(run), "-o", str(tmp_path / "b")]) == 0
+    for name in ("tracks.csv", "tracks.json"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    assert main([*again, str(tmp_path / "leaner"), "--write", "detections,maps"]) == 0
+    with pytest.raises(srt.InputError, match=r"kept no returns\.npz, .* --write detections,returns,maps"):
+        list(observe_run(tmp_path / "leaner"))
+
+
 def test_a_run_without_a_scene_is_refused(run: Path, tmp_path: Path) -> None:
     adc = run / "radars" / "front" / "frame_000000" / "adc.npz"
     assert main(["process", str(adc), "-o", str(tmp_path / "again"), "--no-pictures"]) == 0

@@ -120,6 +120,10 @@ def _of_run(run: Run, radar: str | None, frame: int | None) -> Iterator[Case]:
 def _of_folder(folder: Path, radar: str, index: int, record: Mapping[str, Any], scene: Scene | None) -> Case:
     if not (folder / "returns.npz").is_file():
         raise InputError(f"{folder}: no returns.npz; only runs with simulated echoes can be explained")
+    if not (folder / "cube.npz").is_file():
+        raise InputError(
+            f"{folder}: the run kept no cube.npz; run it with --write returns,cube,detections, or all parts"
+        )
     returns = Returns.load(folder / "returns.npz")
     rows = folder / "scatterers.npz"
     names = {int(o["id"]): str(o["name"]) for o in record["objects"]}

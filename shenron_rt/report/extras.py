@@ -88,11 +88,13 @@ def made_tracks(source: RunSource) -> Tracked:
 
     found: Tracked = {}
     for radar in source.radars:
-        names = ("detections.csv", "cube.npz", "returns.npz")
-        whole = all((f.folder / name).is_file() for f in radar.frames for name in names)
+        whole = all(
+            f.has("detections.csv") and f.has("returns.npz") and (f.has("cube.npz") or f.has("maps.npz"))
+            for f in radar.frames
+        )
         if source.scene is None or len(radar.frames) < _LEAST_FRAMES or not whole:
             continue
-        tracking = track(observe_run(source.root, radar=radar.name), radar=radar.name)
+        tracking = track(observe_run(source, radar=radar.name), radar=radar.name)
         rows = [(r.track, r.object_id, [float(getattr(r, n)) for n in _TRACK_COLUMNS]) for r in tracking.rows]
         found[radar.name] = {"tracks": _tracks(rows), "figures": _plain(tracking.summary())}
     return found
