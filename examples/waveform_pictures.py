@@ -58,7 +58,7 @@ def draw_phase_noise(file: Path) -> None:
         axes.semilogx(
             offset[dots] / 1e3, 10 * np.log10(level[dots]), ".", ms=3.5, color=colour, label=f"{distance:g} m"
         )
-    axes.set(xlabel="distance from the beat frequency [kHz]", ylabel="single-sideband noise [dBc/Hz]", ylim=(-160, -70))
+    axes.set(xlabel="offset from the beat frequency [kHz]", ylabel="single-sideband noise [dBc/Hz]", ylim=(-160, -70))
     axes.grid(alpha=0.3, which="both")
     axes.legend(
         title="dots: synthesised\nlines: L(f) 4 sin² π f τ", loc="lower left", fontsize=8, title_fontsize=8, ncols=2
@@ -79,8 +79,8 @@ def draw_unfolding(file: Path) -> None:
         span = 2 * burst.profile.max_velocity_mps
         label = f"{burst.profile.loop_period_s * 1e6:.1f} µs, 2 v_max {span:.1f} m/s"
         axes.plot(burst.velocity_mps, power, color=colour, lw=1.5, label=label)
-        for fold in (-2, -1, 1, 2):
-            axes.plot(burst.velocity_mps + fold * span, power, color=colour, lw=0.7, alpha=0.45)
+        repeated = np.concatenate([burst.velocity_mps + fold * span for fold in range(-2, 3)])
+        axes.plot(repeated, np.tile(power, 5), color=colour, lw=0.7, alpha=0.45)
     axes.axvline(building["velocity"], color="k", lw=0.8, ls=":")
     axes.set(xlabel="range rate [m/s]", ylabel="power in the building's range [dBm]", xlim=(-90, 90))
     axes.set_title(f"both bursts agree at {building['velocity']:.1f} m/s only", fontsize=9)

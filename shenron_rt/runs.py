@@ -189,9 +189,14 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         raise NotFoundError(f"{root}: not a run folder, it has no summary.json") from None
     except ValueError as error:
         raise InputError(f"{root / 'summary.json'}: not valid JSON ({error})") from None
-    frames = {
-        r["name"]: [frame_folder(root, r["name"], f["frame"]) for f in r["frames"]] for r in summary.get("radars", [])
-    }
+    try:
+        frames = {
+            str(r["name"]): [frame_folder(root, r["name"], int(f["frame"])) for f in r["frames"]]
+            for r in summary.get("radars", [])
+        }
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        what = f"{type(error).__name__}: {error}"
+        raise InputError(f"{root / 'summary.json'}: not the summary of a run ({what})") from None
     missing = [str(f) for folders in frames.values() for f in folders if not f.is_dir()]
     if missing:
         raise InputError(f"{root}: frame folders listed in summary.json are missing: {missing[0]}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import resource
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,6 +33,17 @@ radars:
   - {name: front, profile: awrl1432}
 """
 EPOCH_NS = 1_000_000_000 * 10**9
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond ``size`` bytes, as on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def run_scene(folder: Path, scene: str, *options: str, rays: int = 20_000) -> Path:

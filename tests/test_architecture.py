@@ -30,7 +30,7 @@ LAYERS = (
     ("dsp",),
     ("io", "pipeline", "cshenron", "rcs"),
     ("turntable", "sequence"),
-    ("runs", "run_frames", "run_manifest", "run_setup", "run_summary", "rendering"),
+    ("runs", "run_frames", "run_source", "run_manifest", "run_setup", "run_summary", "rendering"),
     ("batch",),
     ("attribution", "objects"),  # read run folders
     ("plot", "report"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -44,6 +45,33 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes_as_one_process(tmp_p
     (result,) = found
     assert result.complete
     assert result.rendered == 16
+    srt.run_batch(plan, calm, workers=1)
+    assert contents(out) == contents(calm)
+
+
+def test_a_driver_and_a_worker_killed_on_a_cluster_leave_a_batch_that_ends_the_same(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="extra cluster")
+    plan = write_plan(tmp_path, seeds=[1, 2], frames="0:8", block=1, options={"rays": 3000, "backend": "scalar"})
+    out, calm, file = tmp_path / "out", tmp_path / "calm", tmp_path / "scheduler.json"
+    options: dict[str, Any] = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**options) as cluster:
+        file.write_text(json.dumps({"address": cluster.scheduler_address}))
+        words = ["batch", str(plan), "-o", str(out), "--cluster", str(file)]
+        path = os.pathsep.join([str(Path(srt.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+        driver = subprocess.Popen(
+            [sys.executable, "-m", "shenron_rt.cli", *words],
+            env=os.environ | {"PYTHONPATH": path}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        end = time.monotonic() + 120
+        while '"done"' not in _text(out / "journal.jsonl") and time.monotonic() < end:
+            time.sleep(0.02)
+        os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+        driver.kill()
+        assert driver.wait(60) == -signal.SIGKILL  # in the middle of it
+        # what the dead driver has asked for may still be at work beside this
+        result = srt.run_batch(plan, out, cluster=str(file), resume=True)
+    assert result.complete
+    assert 0 < result.rendered < 16  # what was done is kept
     srt.run_batch(plan, calm, workers=1)
     assert contents(out) == contents(calm)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import math
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -121,6 +123,25 @@ def test_an_internal_error_is_exit_1(capsys: pytest.CaptureFixture[str], monkeyp
     monkeypatch.setenv("SHENRON_RT_DEBUG", "1")
     with pytest.raises(ZeroDivisionError):
         main(["profiles", "awrl1432"])
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (errno.ENOSPC, "a.npz: no space left on the disk; what was being written has been removed"),
+        (errno.EROFS, "a.npz: Read-only file system"),
+        (errno.ENAMETOOLONG, "a.npz: File name too long"),
+        (errno.EFBIG, "a.npz: File too large; what was being written has been removed"),
+    ],
+)
+def test_what_the_system_refuses_is_exit_2(
+    code: int, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any, **__: Any) -> None:
+        raise OSError(code, os.strerror(code), "a.npz")
+
+    monkeypatch.setattr("shenron_rt.config.profile.load_profile", refused)
+    assert _refused(capsys, "profiles", "awrl1432") == f"shenron-rt: {said}\n"
 
 
 def test_complain_prints_one_line(capsys: pytest.CaptureFixture[str]) -> None:

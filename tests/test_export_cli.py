@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import resource
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from export_tools import export_mcap_and_read, read_mcap, unpack
+from export_tools import export_mcap_and_read, files_up_to, read_mcap, unpack
 
 import shenron_rt as srt
 from shenron_rt.cli import main
@@ -47,24 +44,13 @@ def _contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-@contextmanager
-def _files_up_to(size: int) -> Iterator[None]:
-    """Let no file of this process grow beyond ``size`` bytes, as on a disk that is full."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_full_disk_is_one_line_and_leaves_nothing_new_and_the_old_as_it_was(
     form: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _needs(form)
     words = ["export", str(run), "--to", form, "-o", str(tmp_path / "out" / "export")]
-    with _files_up_to(1_000):
+    with files_up_to(1_000):
         assert main(words) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
@@ -72,7 +58,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_new_and_the_old_as_it_was(
     assert list((tmp_path / "out").iterdir()) == []
     assert main([*words, "--frames", "0:1"]) == 0
     before = _contents(tmp_path / "out")
-    with _files_up_to(1_000):
+    with files_up_to(1_000):
         assert main([*words, "--overwrite"]) == 2
     assert _contents(tmp_path / "out") == before
 
@@ -124,7 +110,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--to", "csv", "--radar", "rear"], "no radar 'rear'; known: front"),
+        (["--to", "csv", "--radar", "rear"], "no radar 'rear' in this run; it has front"),
         (["--to", "csv", "--frames", "7:9"], "no frames of 7:9; it has 0:3"),
         (["--to", "csv", "--lidar"], "--lidar: --to csv has no such option; it is for mcap and ros2"),
         (["--to", "zarr", "--text"], "--text: --to zarr has no such option; it is for pcd and ply"),

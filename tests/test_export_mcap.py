@@ -24,7 +24,6 @@ from export_tools import (
 
 import shenron_rt as srt
 from shenron_rt.cli import main
-from shenron_rt.config.scene import Actor
 
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed (extra mcap)")
 pytest.importorskip("mcap_protobuf", reason="mcap-protobuf-support is not installed (extra test)")
@@ -215,7 +214,6 @@ def test_a_turning_ego_keeps_points_on_turning_and_static_bodies(tmp_path: Path)
             assert distance_to_mesh(entity, moved(to_body, own[:: len(own) // 20])).max() < 1e-6
 
 
-@pytest.mark.skipif("articulation" not in Actor.model_fields, reason="bodies of this version are rigid as a whole")
 def test_wheels_turn_in_frames_of_their_own(tmp_path: Path) -> None:
     scene = STREET.replace("shape: car,", "shape: car, articulation: auto,")
     (tmp_path / "street.yaml").write_text(scene)

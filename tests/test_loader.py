@@ -51,6 +51,10 @@ def test_numbers_of_yaml_1_1_are_numbers(yaml_file, text):
         ("xyz_m: [1, 2]\n", 1, ["xyz_m", "three numbers are needed, got 2"]),
         ("a: [1\nb: 2\n", 2, ["not valid YAML"]),
         ("- 1\n- 2\n", 1, ["a mapping of keys is needed, got a list"]),
+        ("? [a, b]\n: 3\n", 1, ["not valid YAML", "cannot be read"]),
+        ("carrier_hz: 1\nspare: {radius_m: 1, name: 2020-13-45}\n", 2, ["not valid YAML", "month"]),
+        ("carrier_hz: 1\nspare: {radius_m: !!int x}\n", 2, ["not valid YAML", "'x'"]),
+        ("wheels: [&w {radius_m: 1}]\nspare:\n  <<: *w\n  radius_m: wide\n", 4, ["spare.radius_m", "got 'wide'"]),
     ],
 )
 def test_faults_are_reported_with_file_line_and_key(yaml_file, text, line, words):
@@ -61,6 +65,21 @@ def test_faults_are_reported_with_file_line_and_key(yaml_file, text, line, words
     assert message.startswith(f"{file}:{line}:")
     for word in words:
         assert word in message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("wheels: " + "[" * 900 + "]" * 900 + "\n", "nested too deep"),
+        ("wheels: " + "[" * 100_000 + "]" * 100_000 + "\n", "nest"),
+        ("wheels: &w [*w]\n", "recursive"),
+        ("name: \x00\n", "control characters are not allowed"),
+    ],
+)
+def test_texts_made_to_break_a_parser_are_one_line(yaml_file, text, words):
+    with pytest.raises(ConfigError, match=words) as caught:
+        read_yaml(yaml_file(text))
+    assert "\n" not in str(caught.value)
 
 
 def test_every_fault_is_listed_at_once(yaml_file):

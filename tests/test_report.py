@@ -15,10 +15,11 @@ import shenron_rt as srt
 from shenron_rt.plot._style import dbm
 from shenron_rt.plot.truth import truth_of
 from shenron_rt.report.arrays import Arrays, script_json
-from shenron_rt.report.geometry import SceneMeshes
+from shenron_rt.report.geometry import SceneMeshes, _largest
 from shenron_rt.report.maps import MapPools, pooled
 from shenron_rt.report.palette import diverging, sequential
 from shenron_rt.scene.bodies import load_bodies
+from shenron_rt.scene.mesh import Part, build_mesh
 from shenron_rt.scene.world import build_world
 
 #: Digits of float32: half an ulp is 6e-8 of a value.
@@ -258,6 +259,21 @@ def test_the_smallest_faces_go_first_and_no_vertex_stays_without_one() -> None:
     assert [m["faces"] for m in meshes.records] == [0, n, n]
     assert meshes.records[0]["runs"] == []
     assert 'id="m0.edges"' in arrays.html()
+
+
+def test_of_equal_faces_as_many_as_fit_are_drawn_from_everywhere() -> None:
+    side = 30
+    y, x = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
+    corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    faces = np.concatenate([corner[:, None] + [0, side + 1, side + 2], corner[:, None] + [0, side + 2, 1]])
+    ground = build_mesh(np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]), faces, Part(tag=srt.SemanticTag.Roads))
+    arrays = Arrays()
+    meshes = SceneMeshes.add_to(arrays, srt.Scene(static=[{"mesh": ground}]), most_faces=300)
+    (record,) = meshes.records
+    assert (record["faces"], record["all_faces"]) == (300, 2 * side**2)
+    shown = np.sort(_largest([ground.face_area], 300)[0])
+    # a sixth of 1800; every row of 60 triangles has 10, golden steps miss that by less than two
+    assert np.abs(np.histogram(shown, bins=30, range=(0, 1800))[0] - 10).max() <= 2
 
 
 def test_standing_is_white_and_power_gets_lighter() -> None:

@@ -13,6 +13,7 @@ from chromium_tools import Browser, find_chromium
 from report_tools import FRAMES, NASTY, street_run
 
 import shenron_rt as srt
+from shenron_rt.cli import main
 from shenron_rt.plot._style import dbm
 
 PROGRAM = find_chromium()
@@ -159,6 +160,31 @@ def test_keys_move_the_slider(page: Browser) -> None:
     page.evaluate("document.activeElement.blur()")  # keys work wherever one is
     page.press("ArrowRight")
     assert _frame(page) == 1
+
+
+@pytest.mark.slow
+def test_two_hundred_frames_open_and_every_one_is_reached(browser: Browser, tmp_path: Path) -> None:
+    many = 200
+    (tmp_path / "drone.yaml").write_text(
+        "point_targets: [{id: 9, name: drone, xyz_m: [90, 2, 1], velocity_mps: [-4, 0, 0], rcs_dbsm: 30}]\n"
+    )
+    options = ["--frames", f"0:{many}", "--rays", "100", "--backend", "scalar", "--no-pictures"]
+    run = tmp_path / "drive"
+    assert (
+        main(["run", str(tmp_path / "drone.yaml"), *options, "-o", str(run), "--write", "detections,returns,maps"]) == 0
+    )
+    page = srt.write_report(run)
+    assert page.stat().st_size < 30e6
+    browser.open(page, "#frame=0")
+    before = browser.evaluate("report.stats.redraws")
+    for key, frame in (("End", many - 1), ("ArrowLeft", many - 2), ("Home", 0)):
+        browser.press(key)
+        assert _frame(browser) == frame
+        found = srt.Detections.from_csv(run / f"radars/radar/frame_{frame:06d}/detections.csv")
+        assert len(_cells(browser, "detections")) == len(found)
+    # a press draws a few times at most, however many frames there are
+    assert browser.evaluate("report.stats.redraws") - before <= 3 * 3
+    assert browser.errors == []
 
 
 def test_dragging_the_slider_changes_the_frame_and_the_pictures(page: Browser) -> None:

@@ -230,6 +230,10 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(InputError, match="not valid JSON"):
         runs.load_run(tmp_path)
+    for text in ("[]", '{"radars": [{}]}', '{"radars": [{"name": "front", "frames": 3}]}', '{"radars": 7}'):
+        (tmp_path / "summary.json").write_text(text)
+        with pytest.raises(InputError, match=r"summary\.json: not the summary of a run"):
+            runs.load_run(tmp_path)
     (tmp_path / "summary.json").write_text('{"radars": [{"name": "front", "frames": [{"frame": 3}]}]}')
     with pytest.raises(InputError, match="frame_000003"):
         runs.load_run(tmp_path)

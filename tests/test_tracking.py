@@ -81,6 +81,25 @@ def test_the_car_of_braking_is_one_track_over_ninety_frames() -> None:
     _check_lead(found, seen)
 
 
+@pytest.mark.slow
+def test_the_car_of_the_bundled_scene_is_one_track_as_long_as_it_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--frames", "0:90", "--rays", "30000", "--accuracy", "1e-3", "--no-pictures", "--json"]
+    run = ["run", "braking", *words, "--write", "detections,returns,maps", "-o", str(tmp_path / "run")]
+    assert main(run) == 0
+    capsys.readouterr()
+    assert main(["track", str(tmp_path / "run"), "-o", str(tmp_path / "tracks"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    # it brakes with 1.25 m/s^2 from 10 m/s at 1 s on, and is slower than 1 m/s from 8.2 s on: frames 0 to 81
+    assert told["truths"] == 82
+    assert told["misses"] == 3  # confirmed with the fourth hit
+    assert (told["switches"], told["fragmentations"], told["false_tracks"]) == (0, 0, 0)
+    assert told["tracks_of"] == {"101": [1]}
+    # three frames without a track cost the cutoff; the others less than two thirds of a range cell
+    assert told["ospa_m"] < (3 * told["ospa_cutoff_m"] + 82 * 0.25) / 90
+
+
 def test_truth_has_the_velocity_over_ground_whatever_the_ego_does() -> None:
     scene = srt.Scene(
         ego={"velocity_mps": (8, 0, 0), "yaw_rate_deg_s": 30},
@@ -173,6 +192,18 @@ def test_track_prints_what_each_track_follows(run: Path, tmp_path: Path, capsys:
     assert "drone" in out
     assert "ospa_m" in out
     assert main(["track", str(run), "-o", str(tmp_path / "tracks")]) == 2  # not empty
+
+
+def test_a_lean_run_is_tracked_as_the_whole_one_and_a_leaner_says_what_it_needs(run: Path, tmp_path: Path) -> None:
+    again = ["run", str(run / "config.yaml"), "--no-pictures", "-o"]
+    assert main([*again, str(tmp_path / "lean"), "--write", "detections,returns,maps"]) == 0
+    assert main(["track", str(tmp_path / "lean"), "-o", str(tmp_path / "a")]) == 0
+    assert main(["track", str(run), "-o", str(tmp_path / "b")]) == 0
+    for name in ("tracks.csv", "tracks.json"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    assert main([*again, str(tmp_path / "leaner"), "--write", "detections,maps"]) == 0
+    with pytest.raises(srt.InputError, match=r"kept no returns\.npz, .* --write detections,returns,maps"):
+        list(observe_run(tmp_path / "leaner"))
 
 
 def test_a_run_without_a_scene_is_refused(run: Path, tmp_path: Path) -> None:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..config.scene import Scene, load_scene
+from ..config.scene import Scene
 from ..dsp import Detections, RadarCube
 from ..errors import InputError
 from ..returns import Returns
+from ..run_source import scene_of
 from ..runs import Run, load_run
 from ..scatterers import Scatterers
 from ..synthesis import AdcCube
@@ -119,6 +120,10 @@ def _of_run(run: Run, radar: str | None, frame: int | None) -> Iterator[Case]:
 def _of_folder(folder: Path, radar: str, index: int, record: Mapping[str, Any], scene: Scene | None) -> Case:
     if not (folder / "returns.npz").is_file():
         raise InputError(f"{folder}: no returns.npz; only runs with simulated echoes can be explained")
+    if not (folder / "cube.npz").is_file():
+        raise InputError(
+            f"{folder}: the run kept no cube.npz; run it with --write returns,cube,detections, or all parts"
+        )
     returns = Returns.load(folder / "returns.npz")
     rows = folder / "scatterers.npz"
     names = {int(o["id"]): str(o["name"]) for o in record["objects"]}
@@ -138,10 +143,4 @@ def _of_folder(folder: Path, radar: str, index: int, record: Mapping[str, Any], 
 
 def _scene(config: Path) -> Scene | None:
     """Return the scene behind a run, or None where it came from a LiDAR."""
-    import yaml
-
-    try:
-        data = yaml.safe_load(config.read_text(encoding="utf-8"))
-    except (FileNotFoundError, yaml.YAMLError):
-        return None
-    return load_scene(config) if isinstance(data, dict) and "radars" in data else None
+    return scene_of(config) if config.is_file() else None

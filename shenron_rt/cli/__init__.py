@@ -84,13 +84,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, for example "| head"
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError) as error:
-        return complain(f"{error.filename}: {error.strerror}")
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        if not error.strerror:  # raised by a library, not by the system
             return _internal(error)
-        where = f"{error.filename}: " if error.filename else ""
-        return complain(f"{where}no space left on the disk; what was being written has been removed")
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        what = "no space left on the disk" if full else error.strerror
+        gone = "; what was being written has been removed" if full or error.errno in (errno.EFBIG, errno.EIO) else ""
+        return complain(f"{error.filename}: {what}{gone}" if error.filename else f"{what}{gone}")
     except KeyboardInterrupt:
         return complain("interrupted", code=130)
     except Exception as error:

@@ -156,13 +156,15 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title, style="bold"), title_justify="left", header_style="bold", box=box.SIMPLE_HEAD)
+    console = _console()
+    console.print(Text(title, style="bold"))  # apart: a table's own title is broken at the table's width
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     for index, name in enumerate(columns):
         justify: Literal["left", "right"] = "right" if name.endswith("]") else "left"
         table.add_column(Text(name), justify=justify, overflow="fold", no_wrap=index == 0)
     for row in rows:
         table.add_row(*(Text("-" if cell is None else str(cell)) for cell in row))
-    _console().print(table)
+    console.print(table)
 
 
 def say(text: str) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time as clock
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from ..errors import InputError
 from .common import Json, Overwrite, frame_range, print_json, progress, say
+
+if TYPE_CHECKING:
+    from ..run_source import RunSource
 
 __all__ = ["export"]
 
@@ -82,10 +85,9 @@ def export(
     source = open_run(run, radars=radar, frames=numbers)
     root = run.absolute()
     target = output or root.with_name(f"{root.name}{_ENDINGS[to]}")
-    common: dict[str, Any] = {"radars": radar, "frames": numbers, "overwrite": overwrite}
     started = clock.perf_counter()
     with progress(source.n_frames, f"export to {to}", quiet=json_) as step:
-        _write(to, run, target, {**common, **options, "step": lambda what: step(what, advance=1)})
+        _write(to, source, target, {"overwrite": overwrite, **options, "step": lambda what: step(what, advance=1)})
     if json_:
         print_json({"to": to, "path": target, "frames": source.n_frames, "radars": [r.name for r in source.radars]})
         return 0
@@ -115,14 +117,14 @@ def _options(to: str, given: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _write(to: Format, run: Path, target: Path, options: dict[str, Any]) -> None:
+def _write(to: Format, source: RunSource, target: Path, options: dict[str, Any]) -> None:
     from .. import export as formats
 
     if to == "mcap":
-        formats.export_mcap(run, target, **options)
+        formats.export_mcap(source, target, **options)
     elif to == "ros2":
-        formats.export_ros2(run, target, **options)
+        formats.export_ros2(source, target, **options)
     elif to == "zarr":
-        formats.export_zarr(run, target, **options)
+        formats.export_zarr(source, target, **options)
     else:
-        formats.export_clouds(run, target, to, **options)
+        formats.export_clouds(source, target, to, **options)

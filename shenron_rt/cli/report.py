@@ -32,7 +32,8 @@ def _strongest(radar: str, frame: Mapping[str, Any]) -> list[Any]:
     if best is None:
         return [radar, frame["frame"], None, None, None, None, "nothing detected"]
     names = {o["id"]: o["name"] for o in frame["objects"]}
-    who = "unknown" if best["object_id"] < 0 else names.get(best["object_id"], f"object {best['object_id']}")
+    nobody = "noise" if names else "unknown"  # of a capture nobody knows what is there
+    who = nobody if best["object_id"] < 0 else names.get(best["object_id"], f"object {best['object_id']}")
     values = [f"{best[k]:.2f}" for k in ("range_m", "azimuth_deg", "velocity_mps")]
     chain = best.get("chain", "")
     if ">" in chain:

@@ -18,7 +18,15 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class _SafeLoader(yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoader):  # type: ignore[misc]
-    """Safe loader that refuses a key given twice, which PyYAML silently overwrites."""
+    """Safe loader that refuses a key given twice, which PyYAML silently overwrites, and says where a value fails."""
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep=deep)
+        except (ValueError, TypeError, LookupError, AttributeError) as error:  # 2020-13-45, !!int x, a list as a key
+            raise yaml.constructor.ConstructorError(
+                None, None, f"a value that cannot be read ({error})", node.start_mark
+            ) from None
 
 
 def _mapping_without_duplicates(loader: Any, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -67,12 +75,14 @@ def read_yaml(path: str | os.PathLike[str]) -> tuple[dict[str, Any], yaml.Node |
     except UnicodeDecodeError as error:
         raise ConfigError(f"{file}: not a UTF-8 text file ({error.reason} at byte {error.start})") from None
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        data = yaml.load(text, Loader=_SafeLoader)
+        data, node = _parsed(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
-        raise ConfigError(f"{file}{line}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise ConfigError(f"{file}{line}: not valid YAML: {problem}") from None
+    except RecursionError:
+        raise ConfigError(f"{file}: not a config: its lists or mappings are nested too deep") from None
     if data is None:
         data = {}
     if not isinstance(data, dict):
@@ -80,12 +90,23 @@ def read_yaml(path: str | os.PathLike[str]) -> tuple[dict[str, Any], yaml.Node |
     return data, node
 
 
+def _parsed(text: str) -> tuple[Any, yaml.Node | None]:
+    """Return the values of a text and its parse tree, read once: a scene of ten thousand actors takes seconds."""
+    loader = _SafeLoader(text)
+    try:
+        node = loader.get_single_node()
+        return (None if node is None else loader.construct_document(node)), node
+    finally:
+        loader.dispose()
+
+
 def _line_of(node: yaml.Node | None, location: Sequence[str | int]) -> int | None:
     """Return the line of the deepest part of ``location`` that stands in the file."""
     line = None
     for part in location:
         if isinstance(node, yaml.MappingNode):
-            match = next(((k, v) for k, v in node.value if k.value == str(part)), None)
+            # from the end: keys of the mapping itself come after those that it merges in
+            match = next(((k, v) for k, v in reversed(node.value) if k.value == str(part)), None)
             if match is None:
                 break
             line, node = match[0].start_mark.line + 1, match[1]

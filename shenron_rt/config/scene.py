@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -254,17 +255,19 @@ class Scene(ConfigModel):
         ids = [*moving, *{s.id for s in self.static if s.id}]
         names = [r.name for r in self.radars]
         for label, values in (("id", [str(i) for i in ids]), ("radar name", names)):
-            twice = sorted({v for v in values if values.count(v) > 1})
+            twice = sorted(v for v, count in Counter(values).items() if count > 1)
             if twice:
                 raise ValueError(f"{label} {twice[0]} is given to more than one thing")
         return self
 
     @model_validator(mode="after")
     def _points_have_their_actors(self) -> Self:
-        known = [a.id for a in self.actors]
+        known = {a.id for a in self.actors}
         for point in self.point_targets:
             if point.actor is not None and point.actor not in known:
-                raise ValueError(f"point target {point.id}: no actor {point.actor}; the scene's actors: {known}")
+                raise ValueError(
+                    f"point target {point.id}: no actor {point.actor}; the scene's actors: {sorted(known)}"
+                )
         return self
 
     def radar(self, name: str | None = None) -> RadarMount:

@@ -6,10 +6,11 @@ installs it.
 
 from __future__ import annotations
 
+from ..run_source import open_run
 from .clouds import export_clouds
 from .mcap import export_mcap, layout_path
 from .ros2 import export_ros2
-from .source import EPOCH_S, open_run, stamp_ns
+from .timeline import EPOCH_S, stamp_ns
 from .xarray_view import open_dataset
 from .zarr_store import export_zarr
 

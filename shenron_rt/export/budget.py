@@ -13,7 +13,7 @@ from ..config.profile import RadarProfile
 from ..constants import FOUR_PI_CUBED
 from ..frames import spherical
 from ..returns import Returns
-from .source import RunFrame, RunRadar
+from ..run_source import RunFrame, RunRadar
 
 __all__ = ["ObjectBudget", "budget_text", "object_budgets"]
 

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..errors import InputError
+from ..run_source import RunFrame, RunSource, open_run
 from ..runs import Run, write_json
 from .pcd import write_pcd
 from .ply import write_ply
 from .points import detection_points
-from .poses import ScenePoses, mount_transforms, radar_frame
-from .source import ExportSource, RunFrame, open_run
+from .poses import mount_transforms, radar_frame
 from .target import whole_folder
+from .timeline import Moment, timeline
 
 __all__ = ["INDEX", "CloudFormat", "export_clouds"]
 
@@ -25,7 +26,7 @@ INDEX = "export.json"
 
 
 def export_clouds(
-    run: Run | str | os.PathLike[str],
+    run: RunSource | Run | str | os.PathLike[str],
     path: str | os.PathLike[str],
     form: CloudFormat,
     *,
@@ -39,8 +40,8 @@ def export_clouds(
 
     Parameters
     ----------
-    run : Run or path
-        A run folder.
+    run : RunSource, Run or path
+        A run folder, or one that :func:`~shenron_rt.export.open_run` has opened.
     path : path
         The folder to make.
     form : ``"pcd"``, ``"ply"`` or ``"csv"``
@@ -67,17 +68,15 @@ def export_clouds(
     if form not in ("pcd", "ply", "csv"):
         raise InputError(f"export to {form!r}: one of pcd, ply, csv is needed")
     source, target = open_run(run, radars=radars, frames=frames), Path(path)
-    poses = None if source.scene is None else ScenePoses(source.scene)
     with whole_folder(target, overwrite=overwrite, marker=INDEX) as folder:
         records = []
-        for radar, frame in source.in_order():
+        for moment in timeline(source, step):
+            radar, frame = moment.radar, moment.frame
             name = f"{radar.name}/frame_{frame.index:06d}.{form}"
             (folder / radar.name).mkdir(parents=True, exist_ok=True)
             count = _write(folder / name, frame, form, binary, radar_frame(radar.name))
             records.append({"file": name, "radar": radar.name, "frame": frame.index, "points": count})
-            records[-1] |= {"time_s": frame.mid_s, "sensor_in_world": _pose(source, poses, radar.name, frame)}
-            if step is not None:
-                step(f"{radar.name} frame {frame.index}")
+            records[-1] |= {"time_s": frame.mid_s, "sensor_in_world": _pose(source, moment)}
         write_json(folder / INDEX, {"format": form, "run": source.name, "version": source.version, "frames": records})
     return target
 
@@ -96,10 +95,10 @@ def _write(file: Path, frame: RunFrame, form: CloudFormat, binary: bool, sensor:
     return len(found)
 
 
-def _pose(source: ExportSource, poses: ScenePoses | None, radar: str, frame: RunFrame) -> dict[str, Any] | None:
+def _pose(source: RunSource, moment: Moment) -> dict[str, Any] | None:
     """Return where the radar stands in the world; None for runs without a scene."""
-    if poses is None:
+    if not moment.knows_world:
         return None
-    mount = next(t for t in mount_transforms(source) if t.child == radar_frame(radar))
-    placed = poses.ego(frame.mid_s).then(mount)
+    mount = next(t for t in mount_transforms(source) if t.child == radar_frame(moment.radar.name))
+    placed = moment.ego().then(mount)
     return {"xyz_m": placed.origin, "quaternion_xyzw": placed.quaternion}

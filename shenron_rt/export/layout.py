@@ -6,8 +6,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from ..run_source import RunSource
 from .poses import EGO, WORLD
-from .source import ExportSource
 
 __all__ = ["layout_json"]
 
@@ -15,12 +15,12 @@ __all__ = ["layout_json"]
 _SPEED_MPS = 15.0
 
 
-def layout_json(source: ExportSource, topics: Sequence[str]) -> str:
+def layout_json(source: RunSource, topics: Sequence[str]) -> str:
     """Return the layout as JSON, in the form that Foxglove and Lichtblick import from a file.
 
     Parameters
     ----------
-    source : ExportSource
+    source : RunSource
     topics : sequence of str
         Of the MCAP file; only those get a panel.
     """
@@ -74,7 +74,7 @@ def _cloud(field: str, low: float, high: float, size: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _three_dee(source: ExportSource, topics: Sequence[str]) -> dict[str, Any]:
+def _three_dee(source: RunSource, topics: Sequence[str]) -> dict[str, Any]:
     shown: dict[str, Any] = {}
     for topic in topics:
         if topic.startswith("/lidar/"):

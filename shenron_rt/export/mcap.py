@@ -10,6 +10,7 @@ from typing import Any
 
 from ..constants import DEFAULT_MOUNT_XYZ
 from ..frames import Pose
+from ..run_source import RunFrame, RunRadar, RunSource, open_run
 from ..runs import Run
 from . import mcap_messages as messages
 from .budget import budget_text, object_budgets
@@ -18,10 +19,10 @@ from .mcap_recorder import Recorder
 from .others import LidarClouds, RecordedClouds, lidar_clouds, recorded_clouds
 from .pictures import map_pictures
 from .points import detection_points
-from .poses import ScenePoses, mount_transforms, radar_frame
-from .scene_bodies import drawable, identity_ego
-from .source import EPOCH_S, ExportSource, RunFrame, RunRadar, open_run
+from .poses import mount_transforms, radar_frame
+from .scene_bodies import drawable
 from .target import require, whole_file
+from .timeline import EPOCH_S, timeline
 
 __all__ = ["export_mcap", "layout_path"]
 
@@ -56,7 +57,7 @@ def layout_path(path: Path) -> Path:
 
 
 def export_mcap(
-    run: Run | str | os.PathLike[str],
+    run: RunSource | Run | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
     radars: Sequence[str] | None = None,
@@ -74,8 +75,8 @@ def export_mcap(
 
     Parameters
     ----------
-    run : Run or path
-        A run folder.
+    run : RunSource, Run or path
+        A run folder, or one that :func:`~shenron_rt.export.open_run` has opened.
     path : path
         The file to make, ``.mcap``.
     radars, frames : optional
@@ -123,38 +124,35 @@ def export_mcap(
 
 def _write(
     recorder: Recorder,
-    source: ExportSource,
+    source: RunSource,
     lidars: Sequence[LidarClouds],
     beside: RecordedClouds | None,
     pictures: bool,
     step: Callable[[str], None] | None,
 ) -> None:
-    poses = None if source.scene is None else ScenePoses(source.scene)
     extra = [(other.frame, other.mount) for other in lidars if other.mount is not None]
     if beside is not None:
         extra.append((beside.frame, beside.mount))
     mounts = mount_transforms(source, extra)
-    for count, (radar, frame) in enumerate(source.in_order()):
+    for moment in timeline(source, step):
+        radar, frame = moment.radar, moment.frame
         stamp = recorder.stamp(frame.mid_s)
-        moving = [] if poses is None else poses.bodies(frame.mid_s, moving=True)
-        ego = identity_ego() if poses is None else poses.ego(frame.mid_s)
-        placed = [ego, *mounts, *(b.pose for b in moving)]
+        moving = moment.bodies(moving=True)
+        placed = [moment.ego(), *mounts, *(b.pose for b in moving)]
         recorder.log("/tf", "FrameTransforms", messages.transforms(placed, stamp), stamp)
-        if count == 0 and poses is not None:  # geometry once: bodies that move do so by the transform of their frame
-            bodies = drawable([*poses.bodies(frame.mid_s, moving=False), *moving])
+        if moment.first and moment.knows_world:  # geometry once: bodies that move do so by the transform of their frame
+            bodies = drawable([*moment.bodies(moving=False), *moving])
             recorder.log("/scene", "SceneUpdate", messages.scene_update(bodies, stamp), stamp)
         if pictures:
             _write_maps(recorder, source, radar, frame, stamp)
         _write_radar(recorder, radar, frame, stamp)
-        if radar is source.radars[0]:  # what stands beside the radars comes once a frame
+        if moment.leading:
             _write_others(recorder, source, frame, lidars, beside, stamp)
-        if step is not None:
-            step(f"{radar.name} frame {frame.index}")
 
 
 def _write_others(
     recorder: Recorder,
-    source: ExportSource,
+    source: RunSource,
     frame: RunFrame,
     lidars: Sequence[LidarClouds],
     beside: RecordedClouds | None,
@@ -171,7 +169,7 @@ def _write_others(
             recorder.log(topic, "PointCloud", messages.cloud(points, sensor, stamp), stamp)
 
 
-def _write_maps(recorder: Recorder, source: ExportSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
+def _write_maps(recorder: Recorder, source: RunSource, radar: RunRadar, frame: RunFrame, stamp: int) -> None:
     """Log the maps of one frame as pictures."""
     for name, png in map_pictures(source, radar, frame).items():
         message = messages.image(png, radar_frame(radar.name), stamp)

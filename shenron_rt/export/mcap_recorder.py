@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import IO, Any
 
+from ..run_source import RunSource
 from ..runs import plain
-from .source import ExportSource, stamp_ns
+from .timeline import stamp_ns
 
 __all__ = ["Recorder"]
 
@@ -72,7 +73,7 @@ class Recorder:
             self._channels[topic] = foxglove.Channel(topic, schema=schema, context=self._context)
         self._send(topic, plain(message), stamp)
 
-    def describe(self, source: ExportSource) -> None:
+    def describe(self, source: RunSource) -> None:
         """Write what the file was made from."""
         self._writer.write_metadata(
             "shenron_rt",

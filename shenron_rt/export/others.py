@@ -13,9 +13,9 @@ from ..config.scene import LidarMount
 from ..errors import InputError, NotFoundError
 from ..frames import Pose
 from ..io.recorded import PointCloud, TiLog, read_carla_radar, read_ti_tlv
+from ..run_source import RunFrame, RunSource, trailing_number
 from .points import Points, lidar_points, recorded_points, scatterer_points
 from .poses import EGO
-from .source import ExportSource, RunFrame, trailing_number
 
 __all__ = ["LidarClouds", "RecordedClouds", "lidar_clouds", "recorded_clouds"]
 
@@ -41,7 +41,7 @@ class LidarClouds:
     name: str
     frame: str
     mount: Pose | None
-    _source: ExportSource = field(repr=False)
+    _source: RunSource = field(repr=False)
     _lidar: LidarMount | None = field(repr=False)
     _backend: str = "auto"
 
@@ -57,12 +57,12 @@ class LidarClouds:
         return None if scatterers is None else scatterer_points(scatterers, self._source.radars[0].mount)
 
 
-def lidar_clouds(source: ExportSource, wanted: bool | None, backend: str = "auto") -> list[LidarClouds]:
+def lidar_clouds(source: RunSource, wanted: bool | None, backend: str = "auto") -> list[LidarClouds]:
     """Return the LiDARs of a run.
 
     Parameters
     ----------
-    source : ExportSource
+    source : RunSource
     wanted : bool or None
         None: those of the scene, or the points that a ``lidar`` run was made of. True: of a scene without one also a
         roof LiDAR of 64 channels at (0, 0, 2.5) m. False: none.
@@ -128,13 +128,13 @@ class RecordedClouds:
 
 
 def recorded_clouds(
-    source: ExportSource, files: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None, mount: Pose
+    source: RunSource, files: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None, mount: Pose
 ) -> RecordedClouds | None:
     """Read a recording: one log of TI's demo, or CARLA's radar, one file a frame or a folder of them.
 
     Parameters
     ----------
-    source : ExportSource
+    source : RunSource
         The run that it stands beside.
     files : path or sequence of paths, optional
     mount : Pose

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
-from .source import MAPS, ExportSource, RunFrame, RunRadar
+from ..run_source import MAPS, RunFrame, RunRadar, RunSource
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["map_pictures"]
 
 
-def map_pictures(source: ExportSource, radar: RunRadar, frame: RunFrame) -> dict[str, bytes]:
+def map_pictures(source: RunSource, radar: RunRadar, frame: RunFrame) -> dict[str, bytes]:
     """Return the PNG of every map; none where the run has neither pictures nor cubes.
 
     The picture that the run drew is taken as it is; drawing one takes a fraction of a second.

@@ -15,10 +15,13 @@ from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Scene, StaticPart
 from ..errors import InputError
 from ..frames import Pose
+from ..run_source import RunSource
 from ..scene.world import Body, World, build_world, load_bodies
-from .source import ExportSource
 
-__all__ = ["EGO", "WORLD", "PlacedBody", "ScenePoses", "Transform", "mount_transforms", "radar_frame", "rigid_fit"]
+__all__ = [
+    "EGO", "WORLD", "PlacedBody", "ScenePoses", "Transform", "identity_ego", "mount_transforms", "radar_frame",
+    "rigid_fit",
+]  # fmt: skip
 
 WORLD, EGO = "world", "ego"
 #: A rigid body's vertices follow its pose to rounding; at 10 km from the ego vehicle that is a nanometre [m].
@@ -139,28 +142,31 @@ def _ego(world: World) -> Transform:
     return Transform(WORLD, EGO, world.radar_state.rotation, world.radar_state.origin)
 
 
+def identity_ego() -> Transform:
+    """Return the ego frame of a run that knows no world: it is the world."""
+    return Transform(WORLD, EGO, np.eye(3), np.zeros(3))
+
+
 def _rigid_parts(body: Body) -> list[tuple[str, IntArray]]:
     """Return name and faces of every part of a body that is rigid in itself; the body proper has no name."""
-    face_link = np.asarray(getattr(body, "face_link", np.zeros(body.mesh.n_faces, dtype=np.int32)))
-    names = [getattr(link, "name", "") for link in getattr(body, "links", ())]
     parts = []
-    for number in np.unique(face_link).tolist():
+    for number in np.unique(body.face_link).tolist():
         # names of parts may be patterns, "front left [tr]*": numbers keep them apart
-        name = re.sub(r"\W+", "_", f"{number} {names[number]}").strip("_") if number else ""
-        parts.append((name, np.flatnonzero(face_link == number)))
+        name = re.sub(r"\W+", "_", f"{number} {body.links[number].name}").strip("_") if number else ""
+        parts.append((name, np.flatnonzero(body.face_link == number)))
     return parts
 
 
 def _labels(bodies: Sequence[Body]) -> list[str]:
     """Return a name for each body: its own, else its id; numbered where it occurs again."""
-    labels: list[str] = []
+    labels: dict[str, None] = {}
     for body in bodies:
         base = body.source.name or (f"object_{body.object_id}" if body.object_id else "static")
         label, number = base, 2
         while label in labels:
             label, number = f"{base}_{number}", number + 1
-        labels.append(label)
-    return labels
+        labels[label] = None
+    return list(labels)
 
 
 def rigid_fit(own: FloatArray, seen: FloatArray, *, child: str, parent: str = EGO) -> Transform:
@@ -207,12 +213,12 @@ def radar_frame(name: str) -> str:
     return f"radar/{name}"
 
 
-def mount_transforms(source: ExportSource, extra: Sequence[tuple[str, Pose]] = ()) -> list[Transform]:
+def mount_transforms(source: RunSource, extra: Sequence[tuple[str, Pose]] = ()) -> list[Transform]:
     """Return the poses of all sensors in the ego frame.
 
     Parameters
     ----------
-    source : ExportSource
+    source : RunSource
     extra : sequence of (str, Pose)
         Frames of other sensors: a LiDAR, a recorded radar.
     """

@@ -11,14 +11,14 @@ from typing import Any
 
 from ..errors import InputError
 from ..frames import Pose
+from ..run_source import RunSource, open_run
 from ..runs import Run
 from .others import LidarClouds, lidar_clouds
 from .points import detection_points
-from .poses import ScenePoses, mount_transforms, radar_frame
+from .poses import mount_transforms, radar_frame
 from .ros2_messages import Messages
-from .scene_bodies import identity_ego
-from .source import EPOCH_S, ExportSource, open_run, stamp_ns
 from .target import require, whole_folder
+from .timeline import EPOCH_S, stamp_ns, timeline
 
 __all__ = ["export_ros2", "radar_topics"]
 
@@ -31,7 +31,7 @@ _VERSION = 8
 
 
 def export_ros2(
-    run: Run | str | os.PathLike[str],
+    run: RunSource | Run | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
     radars: Sequence[str] | None = None,
@@ -46,8 +46,8 @@ def export_ros2(
 
     Parameters
     ----------
-    run : Run or path
-        A run folder.
+    run : RunSource, Run or path
+        A run folder, or one that :func:`~shenron_rt.export.open_run` has opened.
     path : path
         The folder to make: ``metadata.yaml`` and one ``.mcap``.
     radars, frames, overwrite, epoch_s, lidar, backend, step
@@ -131,26 +131,23 @@ def radar_topics(names: Sequence[str]) -> dict[str, str]:
     return topics
 
 
-def _write(bag: _Bag, source: ExportSource, lidars: Sequence[LidarClouds], step: Callable[[str], None] | None) -> None:
-    poses = None if source.scene is None else ScenePoses(source.scene)
+def _write(bag: _Bag, source: RunSource, lidars: Sequence[LidarClouds], step: Callable[[str], None] | None) -> None:
     extra: list[tuple[str, Pose]] = [(other.frame, other.mount) for other in lidars if other.mount is not None]
     topics = radar_topics([r.name for r in source.radars])
-    for count, (radar, frame) in enumerate(source.in_order()):
+    for moment in timeline(source, step):
+        radar, frame = moment.radar, moment.frame
         stamp = stamp_ns(frame.mid_s, bag.epoch_s)
-        moving = [] if poses is None else poses.bodies(frame.mid_s, moving=True)
-        ego = identity_ego() if poses is None else poses.ego(frame.mid_s)
-        if count == 0:
+        if moment.first:
             bag.log("/tf_static", bag.messages.transforms(mount_transforms(source, extra), stamp), stamp, latched=True)
-        bag.log("/tf", bag.messages.transforms([ego, *(b.pose for b in moving)], stamp), stamp)
+        moving = [b.pose for b in moment.bodies(moving=True)]
+        bag.log("/tf", bag.messages.transforms([moment.ego(), *moving], stamp), stamp)
         found, sensor = frame.detections(), radar_frame(radar.name)
         topic = topics[radar.name]
         bag.log(f"{topic}/points", bag.messages.cloud(detection_points(found), sensor, stamp), stamp)
         bag.log(f"{topic}/scan", bag.messages.scan(found, sensor, stamp), stamp)
-        if radar.name == source.radars[0].name:
+        if moment.leading:
             for other in lidars:
                 if (points := other.points(frame)) is not None:
                     bag.log(
                         f"/lidar/{_ros_name(other.name)}/points", bag.messages.cloud(points, other.frame, stamp), stamp
                     )
-        if step is not None:
-            step(f"{radar.name} frame {frame.index}")

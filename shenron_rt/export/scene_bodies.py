@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .poses import EGO, WORLD, PlacedBody, Transform
+from .poses import PlacedBody
 
-__all__ = ["MAX_TRIANGLES", "drawable", "identity_ego"]
+__all__ = ["MAX_TRIANGLES", "drawable"]
 
 _log = logging.getLogger(__name__)
 
@@ -33,8 +33,3 @@ def drawable(bodies: Sequence[PlacedBody], limit: int = MAX_TRIANGLES) -> list[P
     if left:
         _log.warning("more than %d triangles: the viewer gets no mesh of %s", limit, ", ".join(left))
     return [b for k, b in enumerate(bodies) if k in kept]
-
-
-def identity_ego() -> Transform:
-    """Return the ego frame of a run that knows no world: it is the world."""
-    return Transform(WORLD, EGO, np.eye(3), np.zeros(3))

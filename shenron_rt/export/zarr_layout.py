@@ -9,8 +9,8 @@ import numpy as np
 
 from .._typing import IntArray, NDArray
 from ..dsp import DETECTION_DTYPE, RadarCube
+from ..run_source import RunRadar
 from .labels import NOTHING
-from .source import RunRadar
 
 __all__ = ["ArraySpec", "Sizes", "axes_of", "detection_arrays", "frame_arrays"]
 

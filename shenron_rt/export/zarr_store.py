@@ -12,10 +12,10 @@ import numpy as np
 from .._typing import IntArray, NDArray
 from ..dsp import Detections, RadarCube
 from ..returns import Returns
+from ..run_source import RunFrame, RunRadar, RunSource, open_run
 from ..runs import Run, plain
 from ..tags import SemanticTag
 from .labels import NOTHING, azimuth_label, doppler_label, object_means
-from .source import ExportSource, RunFrame, RunRadar, open_run
 from .target import require, whole_folder
 from .zarr_layout import ArraySpec, Sizes, axes_of, detection_arrays, frame_arrays
 
@@ -26,7 +26,7 @@ _MARKER = "zarr.json"
 
 
 def export_zarr(
-    run: Run | str | os.PathLike[str],
+    run: RunSource | Run | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
     radars: Sequence[str] | None = None,
@@ -42,8 +42,8 @@ def export_zarr(
 
     Parameters
     ----------
-    run : Run or path
-        A run folder.
+    run : RunSource, Run or path
+        A run folder, or one that :func:`~shenron_rt.export.open_run` has opened.
     path : path
         The store to make, ``.zarr``.
     radars, frames, overwrite, step
@@ -75,7 +75,7 @@ def export_zarr(
     return target
 
 
-def _write_radar(group: Any, source: ExportSource, radar: RunRadar, step: Callable[[str], None] | None) -> None:
+def _write_radar(group: Any, source: RunSource, radar: RunRadar, step: Callable[[str], None] | None) -> None:
     """Make the arrays of one radar, then write them frame by frame."""
     first = radar.frames[0]
     adc, cube = first.has("adc.npz"), first.cube(radar.profile)

@@ -13,12 +13,13 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from .._typing import FloatArray
-from ..config.scene import Scene, load_scene
+from ..config.scene import Scene
 from ..dsp import Detections, RadarCube
 from ..errors import InputError
 from ..io.npz import atomic_write
 from ..returns import Returns
-from ..runs import Run, load_run
+from ..run_source import RunSource, open_run
+from ..runs import Run
 from .clusters import ClusterSettings
 from .metrics import Identity, Ospa, identity_metrics, ospa
 from .observe import Observation, measurements, radar_state, truths_of
@@ -136,7 +137,7 @@ def observe_frame(frame: Frame, scene: Scene) -> Observation:
     return _observation(scene, frame.radar, frame.frame, frame.time, frame.detections, frame.cube, frame.returns)
 
 
-def observe_run(run: Run | str | os.PathLike[str], *, radar: str | None = None) -> Iterator[Observation]:
+def observe_run(run: RunSource | Run | str | os.PathLike[str], *, radar: str | None = None) -> Iterator[Observation]:
     """Yield the frames of a run folder.
 
     Raises
@@ -146,19 +147,18 @@ def observe_run(run: Run | str | os.PathLike[str], *, radar: str | None = None) 
     InputError
         No such radar; a run without a scene, whose ego motion is not known.
     """
-    loaded = run if isinstance(run, Run) else load_run(run)
-    name = radar or next(iter(loaded.frames), None)
-    if name is None or name not in loaded.frames:
-        raise InputError(f"{loaded.root}: no radar {name!r} in this run; it has {', '.join(loaded.radars) or 'none'}")
-    if "scene" not in loaded.summary:
-        raise InputError(f"{loaded.root}: not rendered from a scene, so that the motion of the radar is not known")
-    scene = load_scene(loaded.config)
-    records = next(r["frames"] for r in loaded.summary["radars"] if r["name"] == name)
-    for record, folder in zip(records, loaded.frames[name], strict=True):
-        yield _observation(
-            scene, name, int(record["frame"]), float(record["time_s"]), Detections.from_csv(folder / "detections.csv"),
-            RadarCube.load(folder / "cube.npz"), Returns.load(folder / "returns.npz"),
-        )  # fmt: skip
+    source = open_run(run, radars=None if radar is None else [radar])
+    if source.scene is None:
+        raise InputError(f"{source.root}: not rendered from a scene, so that the motion of the radar is not known")
+    used = source.radars[0]
+    for frame in used.frames:
+        cube, returns = frame.cube(used.profile), frame.returns()
+        if cube is None or returns is None:
+            lost = "returns.npz, which has the truth" if returns is None else "cube.npz or maps.npz"
+            raise InputError(
+                f"{frame.folder}: the run kept no {lost}; run it with --write detections,returns,maps, or all parts"
+            )
+        yield _observation(source.scene, used.name, frame.index, frame.start_s, frame.detections(), cube, returns)
 
 
 def _observation(

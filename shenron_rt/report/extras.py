@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, NotFoundError
+from ..run_source import RunFrame, RunRadar, RunSource
 from .arrays import Arrays
-from .source import FrameFiles, RadarFiles, RunFiles
 
 __all__ = [
     "Explained",
@@ -79,7 +79,7 @@ def load_tracks(file: Path, default: str) -> Tracked:
     return {str(figures.get("radar", default)): {"tracks": _tracks(rows), "figures": figures}}
 
 
-def made_tracks(source: RunFiles) -> Tracked:
+def made_tracks(source: RunSource) -> Tracked:
     """Track what every radar of a run has detected, as ``shenron-rt track`` does.
 
     Runs that cannot be tracked have none: that takes three frames, the motion of a scene, and all files of a frame.
@@ -88,11 +88,13 @@ def made_tracks(source: RunFiles) -> Tracked:
 
     found: Tracked = {}
     for radar in source.radars:
-        names = ("detections.csv", "cube.npz", "returns.npz")
-        whole = all((f.folder / name).is_file() for f in radar.frames for name in names)
+        whole = all(
+            f.has("detections.csv") and f.has("returns.npz") and (f.has("cube.npz") or f.has("maps.npz"))
+            for f in radar.frames
+        )
         if source.scene is None or len(radar.frames) < _LEAST_FRAMES or not whole:
             continue
-        tracking = track(observe_run(source.root, radar=radar.name), radar=radar.name)
+        tracking = track(observe_run(source, radar=radar.name), radar=radar.name)
         rows = [(r.track, r.object_id, [float(getattr(r, n)) for n in _TRACK_COLUMNS]) for r in tracking.rows]
         found[radar.name] = {"tracks": _tracks(rows), "figures": _plain(tracking.summary())}
     return found
@@ -135,7 +137,7 @@ def load_explained(file: Path) -> Explained:
         raise InputError(f"{file}: not what shenron-rt explain writes ({type(error).__name__}: {error})") from None
 
 
-def made_explained(source: RunFiles, progress: Callable[[str], object]) -> Explained:
+def made_explained(source: RunSource, progress: Callable[[str], object]) -> Explained:
     """Explain every object and frame of a run, as ``shenron-rt explain`` does."""
     from ..attribution import explain
 
@@ -147,7 +149,7 @@ def _by_frame(found: Mapping[str, Any]) -> Explained:
 
 
 def add_explained(
-    arrays: Arrays, prefix: str, radar: RadarFiles, objects: Sequence[Mapping[str, Any]], explained: Explained
+    arrays: Arrays, prefix: str, radar: RunRadar, objects: Sequence[Mapping[str, Any]], explained: Explained
 ) -> dict[str, Any] | None:
     """Add ``<prefix>.explain.<k>``, the explanation of every frame that has one; return an overview.
 
@@ -173,7 +175,7 @@ def add_explained(
     return {"has": [f is not None for f in frames], "verdicts": [verdicts[int(o["id"])] for o in objects]}
 
 
-def _bad(radar: RadarFiles, frame: FrameFiles, error: Exception) -> str:
+def _bad(radar: RunRadar, frame: RunFrame, error: Exception) -> str:
     what = f"{type(error).__name__}: {error}"
     return f"explain.json: {radar.name} frame {frame.index} is not what shenron-rt explain writes ({what})"
 

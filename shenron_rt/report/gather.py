@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .._typing import FloatArray
 from ..plot.truth import Truth, truth_of
+from ..run_source import RunRadar, RunSource
 from .arrays import Arrays
 from .maps import MapPools, add_maps
 from .points import add_detections, add_echoes, sampled_echoes
 from .settings import profile_record
-from .source import RadarFiles, RunFiles
 from .truth import add_truth
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ class _Frame(NamedTuple):
 def radar_record(
     arrays: Arrays,
     prefix: str,
-    source: RunFiles,
-    radar: RadarFiles,
+    source: RunSource,
+    radar: RunRadar,
     meshes: SceneMeshes | None,
     limits: Limits,
     progress: Callable[[str], object],
@@ -53,8 +53,8 @@ def radar_record(
     arrays : Arrays
     prefix : str
         That the names of its arrays begin with.
-    source : RunFiles
-    radar : RadarFiles
+    source : RunSource
+    radar : RunRadar
     meshes : SceneMeshes, optional
         Of the scene, where there is one.
     limits : Limits
@@ -69,7 +69,7 @@ def radar_record(
         returns = frame.returns()
         seen.append(
             _Frame(
-                frame.detections(),
+                frame.detections() if frame.has("detections.csv") else None,
                 pools.levels(frame.maps()),
                 truth_of(returns, names),
                 sampled_echoes(returns, limits.frame_echoes),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +14,10 @@ from ..config.materials import MaterialTable, load_materials
 from ..config.scene import Scene
 from ..errors import ShenronError
 from ..plot.top_view import feature_edges
+from ..run_source import RunRadar
 from ..scene.bodies import Body, load_bodies
 from ..scene.world import build_world
 from .arrays import Arrays
-from .source import RadarFiles
 
 __all__ = ["Middles", "SceneMeshes"]
 
@@ -64,20 +65,20 @@ class SceneMeshes:
         arrays : Arrays
         scene : Scene
         most_faces : int
-            Faces of all meshes together; the smallest are left out where there are more. Edges are those of all faces.
+            Faces of all meshes together; the smallest are left out where there are more, of equal ones some here and
+            there. Edges are those of all faces.
         """
         bodies, materials = _loaded(scene)
         distinct: dict[tuple[int, bytes], Body] = {}
         for body in bodies:  # ready-made shapes of one kind share a mesh
             distinct.setdefault((id(body.mesh), body.tag.tobytes()), body)
-        area = np.concatenate([np.zeros(0), *(b.mesh.face_area for b in distinct.values())])
-        least = 0.0 if len(area) <= most_faces else float(np.partition(area, -most_faces)[-most_faces])
-        records = [_add_mesh(arrays, k, body, least) for k, body in enumerate(distinct.values())]
+        shown = _largest([b.mesh.face_area for b in distinct.values()], most_faces)
+        records = [_add_mesh(arrays, k, *each) for k, each in enumerate(zip(distinct.values(), shown, strict=True))]
         order = {key: k for k, key in enumerate(distinct)}
         mesh_of = tuple(order[id(b.mesh), b.tag.tobytes()] for b in bodies)
         return cls(scene, bodies, materials, mesh_of, records)
 
-    def add_poses(self, arrays: Arrays, prefix: str, radar: RadarFiles) -> tuple[list[dict[str, Any]], Middles]:
+    def add_poses(self, arrays: Arrays, prefix: str, radar: RunRadar) -> tuple[list[dict[str, Any]], Middles]:
         """Add where bodies and radar stand in every frame; return the bodies, and the middles of those with an id.
 
         Parameters
@@ -87,7 +88,7 @@ class SceneMeshes:
             those of a body from its row ``pose`` on, and ``<prefix>.radar``, (frames, 15): those of the radar, and its
             velocity (3).
         prefix : str
-        radar : RadarFiles
+        radar : RunRadar
         """
         mount = self.scene.radar(radar.name)
         first = np.concatenate([[0], np.cumsum([len(b.links) for b in self.bodies])]).astype(np.int64)
@@ -126,9 +127,20 @@ def _loaded(scene: Scene) -> tuple[tuple[Body, ...], MaterialTable]:
         return (), load_materials("automotive")
 
 
-def _add_mesh(arrays: Arrays, k: int, body: Body, least: float) -> dict[str, Any]:
+def _largest(areas: Sequence[FloatArray], most: int) -> list[IntArray]:
+    """Return the rows of the largest faces of each mesh, ``most`` of all together."""
+    area = np.concatenate([np.zeros(0), *areas])
+    if len(area) <= most:
+        return [np.arange(len(a)) for a in areas]
+    # a fine grid has many faces of one size: golden steps take some of them everywhere, not all of one side
+    spread = np.arange(len(area)) * ((np.sqrt(5) - 1) / 2) % 1.0
+    kept = np.zeros(len(area), dtype=bool)
+    kept[np.lexsort((spread, -area))[:most]] = True
+    return [np.flatnonzero(part) for part in np.split(kept, np.cumsum([len(a) for a in areas])[:-1])]
+
+
+def _add_mesh(arrays: Arrays, k: int, body: Body, shown: IntArray) -> dict[str, Any]:
     mesh = body.mesh
-    shown = np.flatnonzero(mesh.face_area >= least)
     shown = shown[np.lexsort((body.tag[shown], body.face_link[shown]))]
     faces = mesh.faces[shown]
     edges = [_longest(mesh.vertices, _edges(body, link)) for link in range(len(body.links))]

@@ -11,8 +11,8 @@ import numpy as np
 from .._typing import FloatArray
 from ..frames import spherical
 from ..plot.truth import Truth
+from ..run_source import RunRadar
 from .arrays import Arrays
-from .source import RadarFiles
 
 __all__ = ["TRUTH_COLUMNS", "add_truth"]
 
@@ -24,7 +24,7 @@ TRUTH_COLUMNS = ("range_m", "azimuth_deg", "velocity_mps", "x_m", "y_m", "power_
 def add_truth(
     arrays: Arrays,
     prefix: str,
-    radar: RadarFiles,
+    radar: RunRadar,
     names: Mapping[int, str],
     echoing: Sequence[Sequence[Truth]],
     middles: Mapping[int, FloatArray],
@@ -35,7 +35,7 @@ def add_truth(
     ----------
     arrays : Arrays
     prefix : str
-    radar : RadarFiles
+    radar : RunRadar
     names : mapping of int to str
         Names by id.
     echoing : sequence of sequence of Truth

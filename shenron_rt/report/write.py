@@ -12,6 +12,7 @@ from typing import IO, Any
 
 from ..errors import InputError
 from ..io.npz import atomic_write
+from ..run_source import RunSource, open_run
 from .arrays import Arrays, script_json
 from .extras import (
     Explained,
@@ -27,7 +28,6 @@ from .gather import Limits, radar_record
 from .geometry import SceneMeshes
 from .palette import diverging, sequential
 from .points import DETECTION_COLUMNS
-from .source import RunFiles, open_run
 from .truth import TRUTH_COLUMNS
 
 __all__ = ["check_page", "write_report"]
@@ -132,7 +132,7 @@ def check_page(path: Path, overwrite: bool) -> None:
         raise InputError(f"-o {path}: exists; give another name, or --overwrite to replace it")
 
 
-def _page(source: RunFiles, tracks: Tracked, explained: Explained, progress: Callable[[str], object]) -> str:
+def _page(source: RunSource, tracks: Tracked, explained: Explained, progress: Callable[[str], object]) -> str:
     arrays = Arrays()
     arrays.add("lut.sequential", sequential(), "u1")
     arrays.add("lut.diverging", diverging(), "u1")
@@ -147,7 +147,7 @@ def _page(source: RunFiles, tracks: Tracked, explained: Explained, progress: Cal
         record["explained"] = add_explained(arrays, f"r{i}", radar, record["objects"], explained)
         radars.append(record)
     about = {
-        "title": source.title,
+        "title": source.name,
         "description": "" if source.scene is None else source.scene.description,
         "folder": source.root.resolve().name,
         "summary": {k: v for k, v in source.summary.items() if isinstance(v, str | int | float)},
@@ -157,7 +157,7 @@ def _page(source: RunFiles, tracks: Tracked, explained: Explained, progress: Cal
         "tracks": tracks,
         "config": source.config,
     }
-    return _filled(source.title, about, arrays)
+    return _filled(source.name, about, arrays)
 
 
 def _filled(title: str, about: Mapping[str, Any], arrays: Arrays) -> str:

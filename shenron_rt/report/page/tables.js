@@ -94,7 +94,7 @@ painters.push((what) => {
       notes.push(row(`${name} map in this page`, `steps of ${fixed(step_db)} dB${cells}`));
     }
   }
-  if (echoes) notes.push(row("echoes in this page", echoes.every > 1 ? `every ${echoes.every}th or more` : "all"));
+  if (echoes) notes.push(row("echoes in this page", echoes.every > 1 ? `one in ${echoes.every}, or more` : "all"));
   const hidden = about.meshes.reduce((n, m) => n + m.all_faces - m.faces, 0);
   if (hidden) notes.push(row("smallest triangles left out", String(hidden)));
   byId("derived").append(el("tbody", {}, ...notes));
