@@ -25,7 +25,7 @@ from .views import Views
 __all__ = ["CHUNK", "Settings", "scattered"]
 
 #: Cells worked on at once: bounds memory.
-CHUNK = 1 << 17
+CHUNK = 1 << 18
 #: Level from which on the cells of a view are only quartered while there are no more of them than this: a corner has
 #: edges that meet at few points, which do not average out, a duct or a car has them everywhere.
 _COARSE, _FEW = 3, 512
