@@ -45,6 +45,8 @@ class _Rigid:
         Of a sphere that holds them, infinite for what is everywhere [m].
     link : int
         Of the world; -1 for what stands still.
+    whole : bool
+        Whether it is all of the world, face by face.
     """
 
     caster: RayCaster
@@ -52,6 +54,7 @@ class _Rigid:
     center: FloatArray
     radius: float
     link: int
+    whole: bool
 
 
 class WorldCaster:
@@ -111,15 +114,20 @@ class WorldCaster:
         coherent : bool
             Whether neighbours in the list are neighbours in space; see :meth:`RayCaster.cast`.
         """
-        nearest = self._loose_rows[self._loose.cast(directions, origins)]
+        nearest = self._loose_rows[self._loose.cast(directions, origins)] if self._loose.n_faces else None
         for rigid in self._rigid:
             rotation, shift = self._pose(rigid)  # radar to the part's frame
             rays = _towards(rigid, rotation, shift, directions, origins)
             d, o = (directions, origins) if rays is None else (directions[:, rays], _columns(origins, rays))
             start = shift[:, None] if o is None else _turned(rotation, o) + shift[:, None]
-            hit = rigid.rows[rigid.caster.cast(_turned(rotation, d), start, coherent=coherent and rays is None)]
+            hit = rigid.caster.cast(_turned(rotation, d), start, coherent=coherent and rays is None)
+            hit = hit if rigid.whole else rigid.rows[hit]
+            if nearest is None and rays is None:
+                nearest = hit
+                continue
+            nearest = _nothing(directions) if nearest is None else nearest
             self._merge(nearest, hit, rays, directions, origins)
-        return nearest
+        return _nothing(directions) if nearest is None else nearest
 
     def _pose(self, rigid: _Rigid) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return rotation and shift from the radar's frame to that of a rigid part."""
@@ -164,7 +172,8 @@ def _rigid(vertices: FloatArray, world: World, faces: IntArray, link: int, backe
     low, high = points.min(axis=0), points.max(axis=0)
     radius = np.inf if link < 0 else float(np.linalg.norm(high - low)) / 2.0 + _SLACK_M
     rows = np.append(faces, -1).astype(np.int32)
-    return _Rigid(RayCaster(points, triangles, backend), rows, (low + high) / 2.0, radius, link)
+    whole = len(faces) == len(world.faces)
+    return _Rigid(RayCaster(points, triangles, backend), rows, (low + high) / 2.0, radius, link, whole)
 
 
 def _at_rest(world: World, anchor: FloatArray) -> FloatArray:
@@ -190,11 +199,19 @@ def _towards(
     center = (rotation.T @ (rigid.center.astype(np.float32) - shift))[:, None]
     if o is not None:
         center = center - o
-    along = d[0] * center[0] + d[1] * center[1] + d[2] * center[2]
+    along = d[0] * center[0]
+    along += d[1] * center[1]
+    along += d[2] * center[2]
     square = center[0] ** 2 + center[1] ** 2 + center[2] ** 2
     near = np.float32(rigid.radius) ** 2
     # the foot of the centre on the ray lies within the sphere, or its start does
-    return np.flatnonzero((square - along**2 <= near) & ((along > 0) | (square <= near))).astype(np.int64)
+    if o is None:
+        return None if square[0] <= near else np.flatnonzero(along >= np.sqrt(square[0] - near))
+    return np.flatnonzero((square - along**2 <= near) & ((along > 0) | (square <= near)))
+
+
+def _nothing(directions: NDArray[np.float32]) -> IntArray:
+    return np.full(directions.shape[1], -1, dtype=np.int32)
 
 
 def _columns(rows: NDArray[np.float32] | None, which: IntArray) -> NDArray[np.float32] | None:
@@ -209,5 +226,7 @@ def _used(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 def _turned(rotation: NDArray[np.float32], rows: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return (3, n) rotated columns, by sums whose order does not depend on the number of threads."""
+    if np.array_equal(rotation, np.eye(3)):
+        return rows
     x, y, z = rows
     return np.stack([r[0] * x + r[1] * y + r[2] * z for r in rotation])
