@@ -22,6 +22,7 @@ from ..randomness import frame_generator
 from ..scatterers import Scatterers
 from ..scene.world import World, build_world
 from .advice import advise_thin
+from .assembly import assembled
 from .backend import choose_backend
 from .launch import Cells, UnionPattern, lit_part, pattern_cells, turned
 from .launches import Launch
@@ -102,16 +103,7 @@ def trace_shared(
         numbers = [launch.draw() for launch in mine]
         points = _point_rows(scene, own, caster, instant)
         columns = _gathered(own, mine, [parts[0][rows], *parts[1:]], found, numbers, points)
-        return Scatterers(
-            **columns,
-            material_names=tuple(own.materials.materials),
-            weather=None if scene.weather is None else scene.weather.plain(),
-            radar=mount.name,
-            seed=run_seed,
-            frame=frame,
-            backend=caster.backend,
-            door="mesh",
-        )
+        return assembled(columns, None, scene, own, caster, mount.name, run_seed, frame)
 
     return {m.name: scatterers(m, p, *part) for m, p, part in zip(mounts, profiles, lit, strict=True)}
 

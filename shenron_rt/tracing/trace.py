@@ -24,6 +24,7 @@ from ..scene.motion_of import point_state
 from ..scene.world import Body, World, build_world, load_bodies, relative_motion
 from ..tags import SemanticTag
 from .advice import advise_thin
+from .assembly import assembled
 from .backend import Backend, choose_backend
 from .launch import Cells, aimed_cells, pattern_cells, turned
 from .launches import Launch, launch_directions
@@ -114,17 +115,7 @@ def trace(
         image = image_launches(world, caster, aimed, run_seed, frame, mount.name)
         bounced = bounced_paths(world, caster, launches, parts, hits, image, max_bounces, wavenumber)
         bounced = Paths.join([bounced, point_paths(world, caster, points, max_bounces)])
-    return Scatterers(
-        **columns,
-        paths=bounced,
-        material_names=tuple(world.materials.materials),
-        weather=None if scene.weather is None else scene.weather.plain(),
-        radar=mount.name,
-        seed=run_seed,
-        frame=frame,
-        backend=caster.backend,
-        door="mesh",
-    )
+    return assembled(columns, bounced, scene, world, caster, mount.name, run_seed, frame)
 
 
 def _gathered(
