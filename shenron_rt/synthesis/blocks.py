@@ -15,8 +15,8 @@ import numpy as np
 from .._parallel import map_blocks
 from .._typing import BoolArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
-from .expansion import MAX_AMPLITUDE, rank
-from .signal import Clock, Points
+from .expansion import MAX_AMPLITUDE, ranks
+from .signal import Clock, Points, dot
 
 __all__ = ["Block", "Group", "cut", "group_points"]
 
@@ -211,9 +211,8 @@ class _Bounds:
         found = np.empty((6, len(points)))
 
         def fill(part: slice) -> None:
-            p, v = points.position[part], points.velocity[part]
-            square, along = np.einsum("qi,qi->q", v, v), np.einsum("qi,qi->q", p, v)
-            range_square = np.einsum("qi,qi->q", p, p)
+            p, v = points.position[part].T, points.velocity[part].T
+            square, along, range_square = dot(v, v), dot(p, v), dot(p, p)
             r, speed = np.sqrt(range_square), np.sqrt(square)
             safe = np.where(square > 0, square, 1.0)
             line = np.sqrt(np.maximum(range_square - along**2 / safe, 0.0))
@@ -256,17 +255,24 @@ class _Bounds:
 
     def phases(self, clock: Clock, half: float) -> tuple[FloatArray, FloatArray]:
         """Return the amplitude of the curvature phase, and a bound of what is neglected, in blocks of +-half [rad]."""
-        curvature = np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * self.curvature * half**2
-        ratio = self.speed * half / self.least
-        # fifth order and beyond: the leading Chebyshev coefficient of x^5 is 1/16
-        series = np.where(ratio < 0.5, curvature * ratio**3 / 8, np.inf)
-        # the quadratic delay term -k tau^2 / 2 beyond what moves into frequency, curvature and the fast x slow term
         chirpiness = clock.slope_hz_per_s / clock.window_mid_hz
-        moved = 2 * self.speed * half / SPEED_OF_LIGHT
         fast = chirpiness * float(np.ptp(clock.sample_s)) / 2
-        cross = chirpiness * (2 * self.farthest / SPEED_OF_LIGHT * fast + moved) * curvature
-        late = np.pi / 2 * clock.slope_hz_per_s * moved**2 * fast
-        return curvature, series + cross + late
+        found = np.empty((2, len(self.rate)))
+
+        def fill(part: slice) -> None:
+            curvature = (np.pi * clock.window_mid_hz / SPEED_OF_LIGHT * half**2) * self.curvature[part]
+            travel = half * self.speed[part]
+            ratio = travel / self.least[part]
+            # fifth order and beyond: the leading Chebyshev coefficient of x^5 is 1/16
+            series = np.where(ratio < 0.5, curvature * (ratio * ratio * ratio) / 8, np.inf)
+            # the quadratic delay term -k tau^2 / 2 beyond what moves into frequency, curvature and the fast x slow term
+            moved = 2 / SPEED_OF_LIGHT * travel
+            cross = chirpiness * (2 * fast / SPEED_OF_LIGHT * self.farthest[part] + moved) * curvature
+            late = (np.pi / 2 * clock.slope_hz_per_s * fast) * (moved * moved)
+            found[:, part] = curvature, series + cross + late
+
+        map_blocks(fill, len(self.rate))
+        return found[0], found[1]
 
 
 def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list[tuple[IntArray, float]]:
@@ -282,20 +288,18 @@ def _by_curvature(phase: FloatArray, tolerance: float, term_cost: float) -> list
     counts = np.bincount(cell, minlength=len(edges) + 1)
     at = np.concatenate([[0], np.flatnonzero(counts) + 1])
     before = np.concatenate([[0], np.cumsum(counts)])
-    lower = np.concatenate([[0.0], edges])
-    best, back = [0.0], [0]
+    lower = np.concatenate([[0.0], edges])[at[:-1]]
+    terms = ranks((edges[np.minimum(at[1:] - 1, len(edges) - 1)] - lower[:, None]) / 2, tolerance)
+    size = before[at[1:]] - before[at[:-1], None]
+    costs = COST_TRANSFORM + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms)
+    best, back = np.zeros(len(at)), [0]
     for j in range(1, len(at)):
-        costs = []
-        for i in range(j):
-            top = edges[min(at[j] - 1, len(edges) - 1)]
-            terms = rank((top - lower[at[i]]) / 2, tolerance)
-            size = int(before[at[j]] - before[at[i]])
-            costs.append(best[i] + COST_TRANSFORM + term_cost * terms + size * (COST_POINT + COST_SPREAD * terms))
-        back.append(int(np.argmin(costs)))
-        best.append(min(costs))
+        through = best[:j] + costs[:j, j - 1]
+        back.append(int(np.argmin(through)))
+        best[j] = through[back[j]]
     groups, j = [], len(at) - 1
     while j > 0:
         rows = np.flatnonzero((cell >= at[back[j]]) & (cell < at[j]))
-        groups.append((rows, best[j] - best[back[j]]))
+        groups.append((rows, float(best[j] - best[back[j]])))
         j = back[j]
     return groups[::-1]

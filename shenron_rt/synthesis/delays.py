@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from .._parallel import map_blocks
 from .._typing import ComplexArray, FloatArray, IntArray
 from ..constants import SPEED_OF_LIGHT
 from .blocks import Block
-from .signal import Points
+from .signal import Points, dot
 
 __all__ = ["N_RESIDUALS", "MovedPoints", "Phases"]
 
@@ -54,7 +55,7 @@ class MovedPoints:
             np.multiply(v, time_s, out=p)
             p += points.position.take(chosen, axis=0).T
             for found, a, b in zip(products[:, part], (p, p, v), (p, v, v), strict=True):
-                np.einsum("iq,iq->q", a, b, out=found)
+                found[:] = dot(a, b)
 
         map_blocks(move, len(rows))
         sent = None if points.sent is None else cls.at(points.sent, rows, time_s)
@@ -81,21 +82,23 @@ class MovedPoints:
         """The echoes as transmitters see them."""
         return self if self.sent is None else self.sent
 
-    def range_derivatives(self, element_m: FloatArray, order: int) -> list[FloatArray]:
-        """Return the distance to an element and its time derivatives up to ``order`` (2 to 4).
+    def range_derivatives(self, element_m: FloatArray, order: int, dtype: DTypeLike = np.float64) -> list[FloatArray]:
+        """Return the distance to an element and its time derivatives up to ``order`` (2 to 4), these in ``dtype``.
 
         From differentiating r^2 = abs(p + v t - e)^2: r r' = (p - e).v, r'^2 + r r'' = v^2, 3 r' r'' + r r''' = 0.
         """
         if element_m.any():
-            square = self.range_square + element_m @ element_m
-            square -= (2 * element_m) @ self.position
+            square = (-2 * element_m) @ self.position
+            square += self.range_square
+            square += element_m @ element_m
             along = self.along - element_m @ self.velocity
         else:
             square, along = self.range_square, self.along
-        r = np.sqrt(square)
-        first = along / r
-        second = (self.speed_square - first * first) / r
-        found = [r, first, second]
+        distance = np.sqrt(square)
+        r = distance.astype(dtype, copy=False)
+        first = along.astype(dtype, copy=False) / r
+        second = (self.speed_square.astype(dtype, copy=False) - first * first) / r
+        found = [distance, first, second]
         if order > 2:
             ratio = first / r
             found.append(-3 * ratio * second)
@@ -128,20 +131,21 @@ class Phases:
         """Turn two-way range derivatives [m, m/s ...] into phases; see the formulas of ``nufft``.
 
         Taylor to Chebyshev on [-h, h]: T^2 = h^2 (1 + C2) / 2, T^3 = h^3 (3 C1 + C3) / 4,
-        T^4 = h^4 (3 + 4 C2 + C4) / 8. Derivatives left out by ``ranges`` are negligible.
+        T^4 = h^4 (3 + 4 C2 + C4) / 8. Derivatives left out by ``ranges`` are negligible; they may be in single
+        precision, and so are then the slow frequencies and the residuals.
         """
         h, fc, k = block.half_s, block.clock.window_mid_hz, block.clock.slope_hz_per_s
-        t1 = ranges[1] / SPEED_OF_LIGHT
+        d1 = ranges[1] / SPEED_OF_LIGHT
         bend = h**2 / (4 * SPEED_OF_LIGHT) * ranges[2]
-        d0 = ranges[0] / SPEED_OF_LIGHT + bend
-        d1 = t1
+        d0 = ranges[0] / SPEED_OF_LIGHT
+        d0 += bend
         if len(ranges) > 3:
-            d1 = t1 + h**2 / (8 * SPEED_OF_LIGHT) * ranges[3]
+            d1 += h**2 / (8 * SPEED_OF_LIGHT) * ranges[3]
         if len(ranges) > 4:
             quartic = h**4 / (192 * SPEED_OF_LIGHT) * ranges[4]
             d0 += 3 * quartic
             bend += 4 * quartic
-        seen = fc - k * d0
+        seen = (fc - k * d0).astype(d1.dtype, copy=False)
         swept = (k * h**2 / 4) * (d1 * d1)
         residuals = []
         for i in used:
@@ -152,6 +156,11 @@ class Phases:
             elif i == 2:
                 residuals.append(TAU * fc * quartic)
             else:
-                residuals.append((TAU * k**2 / fc * block.fast_half_s * h) * d0 * d1)
-        constant = (fc - k / 2 * d0) * d0 - swept
-        return cls(constant, TAU * k * d0, TAU * seen * d1, residuals)
+                residuals.append((TAU * k**2 / fc * block.fast_half_s * h) * d0.astype(d1.dtype, copy=False) * d1)
+        constant = d0 * (-k / 2)
+        constant += fc
+        constant *= d0
+        constant -= swept
+        slow = seen * d1
+        slow *= TAU
+        return cls(constant, TAU * k * d0, slow, residuals)

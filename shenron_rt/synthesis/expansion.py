@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from .._typing import ComplexArray, FloatArray, NDArray
+from .._typing import ComplexArray, FloatArray, IntArray, NDArray
 
-__all__ = ["MAX_AMPLITUDE", "LowRank", "monomials", "rank", "series_orders"]
+__all__ = ["MAX_AMPLITUDE", "LowRank", "monomials", "ranks", "series_orders"]
 
 #: Largest amplitude of a factor [rad]; beyond it the frame is cut into shorter blocks.
 MAX_AMPLITUDE = 3.0
@@ -32,12 +32,16 @@ _COLUMNS = 2048
 Orders = tuple[int, ...]
 
 
-def rank(amplitude: float, tolerance: float) -> int:
-    """Return how many terms exp(j A x b) needs: abs(J_p(A)) <= (A/2)^p / p! (Abramowitz and Stegun 9.1.62)."""
-    for p in range(1, _ORDER_LIMIT):
-        if 2 * (amplitude / 2) ** p / math.factorial(p) <= tolerance:
-            return p
-    return _ORDER_LIMIT
+def ranks(amplitude: FloatArray, tolerance: float) -> IntArray:
+    """Return how many terms exp(j A x b) needs: abs(J_p(A)) <= (A/2)^p / p! (Abramowitz and Stegun 9.1.62).
+
+    For A up to :data:`MAX_AMPLITUDE`, where that bound falls from order to order.
+    """
+    needed, bound = np.ones(amplitude.shape, dtype=np.int64), amplitude
+    for p in range(2, _ORDER_LIMIT):
+        needed += bound > tolerance
+        bound = bound * amplitude / (2 * p)
+    return needed
 
 
 def series_orders(amplitudes: Sequence[float], tolerance: float) -> list[Orders]:

@@ -12,7 +12,7 @@ from ..config.profile import RadarProfile
 from ..errors import InputError
 from ..returns import Returns
 
-__all__ = ["Clock", "Field", "Points", "decode", "doppler_ramps", "hadamard", "transmitted"]
+__all__ = ["Clock", "Field", "Points", "decode", "doppler_ramps", "dot", "hadamard", "transmitted"]
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,14 @@ def _two_legs(points: Points, departure: FloatArray, departure_velocity: FloatAr
     position[rows] = back[:, None] * toward
     velocity[rows] = rest[:, None] * toward + (back / half)[:, None] * across
     return Points(points.amplitude, position, velocity, Points(points.amplitude, departure, departure_velocity))
+
+
+def dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the scalar products of vectors (3, n) and (3, n); einsum takes several times as long."""
+    found: FloatArray = a[0] * b[0]
+    found += a[1] * b[1]
+    found += a[2] * b[2]
+    return found
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -19,13 +18,13 @@ from .gridding import SPACING, Kernel, series
 __all__ = ["EXPANSION_SHARE", "NEGLECTED_SHARE", "TRANSFORM_SHARE", "Prepared"]
 
 #: Shares of the accuracy: the transforms, the expansion, what is neglected. The first two are independent errors, the
-#: second a bound for the worst echo; they add to 0.7 at most in the tests.
+#: second a bound for the worst echo; they add to 0.75 at most in the tests.
 TRANSFORM_SHARE, EXPANSION_SHARE, NEGLECTED_SHARE = 0.45, 0.55, 0.1
 #: RMS error of sources one radian from the centre where points are spread, and where the series is summed, in single
 #: precision (measured: 4e-8 to 6e-8, 1.0e-7 to 2.5e-7), and the finest accuracy single precision reaches.
 SPREAD_ROUNDING, SERIES_ROUNDING, SINGLE_ACCURACY = 5e-8, 1.5e-7, 2.5e-5
-#: Echoes whose residual phases choose the low-rank form, at each element pair probed.
-SAMPLED_ECHOES = 160
+#: Echoes of a block of rows whose residual phases choose the low-rank form, at each element pair probed.
+SAMPLED_ECHOES = 64
 #: Residual phases between the element pairs probed may exceed those found by this factor of their spread.
 PROBE_MARGIN = 1.1
 
@@ -39,8 +38,8 @@ class Prepared:
     accuracy : float
     block : Block
     points : MovedPoints
-    to_tx : (order + 1, n) float
-        Distance to the transmitter and its derivatives.
+    to_tx : order + 1 arrays (n,) float
+        Distance to the transmitter and its derivatives, these in single precision where that is enough.
     used : tuple of int
         The residual phases that matter.
     middle, half : (len(used),) float
@@ -59,7 +58,7 @@ class Prepared:
     accuracy: float
     block: Block
     points: MovedPoints
-    to_tx: FloatArray
+    to_tx: list[FloatArray]
     used: tuple[int, ...]
     middle: list[float]
     half: list[float]
@@ -74,21 +73,23 @@ class Prepared:
         """Choose the low-rank form from the echoes, seen from the elements that differ most."""
         every = tuple(range(N_RESIDUALS))
         probes = _probes(rx_m)
-        to_tx, seen = np.empty((5, len(moved))), np.empty((N_RESIDUALS, len(moved)))
+        dtype = _precision(accuracy)
+        to_tx = [np.empty(len(moved)), *np.empty((4, len(moved)), dtype=dtype)]
 
-        def look(part: slice) -> tuple[float, ...]:
+        def look(part: slice) -> tuple[FloatArray, IntArray]:
             points = moved.part(part)
-            to_tx[:, part] = points.outward.range_derivatives(tx_m, 4)
-            phases = _phases(block, points, to_tx[:, part], probes[0], every)
-            seen[:, part] = phases.residuals
-            return *_ends(phases.fast), *_ends(phases.slow)
+            for kept, found in zip(to_tx, points.outward.range_derivatives(tx_m, 4, dtype), strict=True):
+                kept[part] = found
+            phases = _phases(block, points, [d[part] for d in to_tx], probes[0], every, dtype)
+            ends = np.array([(x.min(), x.max()) for x in (phases.fast, phases.slow, *phases.residuals)])
+            return ends, part.start + _sample_rows(phases.residuals)
 
-        ends = np.array(map_blocks(look, len(moved)))
-        first, last = ends[:, ::2].min(axis=0), ends[:, 1::2].max(axis=0)
-        rows = _sample_rows(seen)
-        few = moved.part(rows)
-        sampled = np.concatenate([_phases(block, few, to_tx[:, rows], rx, every).residuals for rx in probes], axis=1)
-        low, high = np.minimum(seen.min(axis=1), sampled.min(axis=1)), np.maximum(seen.max(axis=1), sampled.max(axis=1))
+        seen = map_blocks(look, len(moved))
+        first, last = np.min([e[:, 0] for e, _ in seen], axis=0), np.max([e[:, 1] for e, _ in seen], axis=0)
+        rows = np.concatenate([rows for _, rows in seen])
+        few, ways = moved.part(rows), [d[rows] for d in to_tx]
+        sampled = np.concatenate([_phases(block, few, ways, rx, every).residuals for rx in probes], axis=1)
+        low, high = np.minimum(first[2:], sampled.min(axis=1)), np.maximum(last[2:], sampled.max(axis=1))
         floor = EXPANSION_SHARE / 50 * accuracy
         used = tuple(i for i in every if max(-low[i], high[i]) > floor)
         middle = [float(low[i] + high[i]) / 2 for i in used]
@@ -96,8 +97,8 @@ class Prepared:
         parameters = [(sampled[i] - m) / h for i, m, h in zip(used, middle, half, strict=True)]
         shapes = [block.shapes[i] for i in used]
         form = LowRank.fit(half, parameters, [b[block.sample_rows] for b in shapes], EXPANSION_SHARE * accuracy)
-        centre = (first + last) / 2
-        extent = _extent(block, *map(float, last - first))
+        centre = (first + last)[:2] / 2
+        extent = _extent(block, *map(float, (last - first)[:2]))
         asked = TRANSFORM_SHARE * accuracy / form.weights
         kernels = [Kernel.reaching(float(eps), _single(eps, SPREAD_ROUNDING * extent)) for eps in asked]
         coarse = [_single(eps, SERIES_ROUNDING * extent) for eps in asked]
@@ -105,27 +106,26 @@ class Prepared:
         for m, b in zip(middle, shapes, strict=True):
             angle += m * b
         waves = form.waves(shapes, block.time.size) * _phasor(angle)
+        fast, slow = (SPACING * unit for unit in block.unit_targets)
         for wave, kernel in zip(waves, kernels, strict=True):
-            wave *= kernel.correction(*block.unit_targets)
+            wave *= kernel.correction(fast) * kernel.correction(slow)
         order = 4 if 2 in used else 3 if 1 in used else 2
         return cls(accuracy, block, moved, to_tx[: order + 1], used, middle, half, form, centre, kernels, coarse, waves)
 
     def transform(self, rx_m: FloatArray) -> ComplexArray:
         """Sum the echoes at one receiver: (n_chirps, n_samples)."""
-        n, order = len(self.points), len(self.to_tx) - 1
-        fast, slow, constant = np.empty(n), np.empty(n), np.empty(n)
-        coarse = self.accuracy * TRANSFORM_SHARE >= SINGLE_ACCURACY
-        dtype: DTypeLike = np.float32 if coarse else np.float64
+        n, dtype = len(self.points), _precision(self.accuracy)
+        fast, slow, constant = np.empty(n), np.empty(n, dtype=dtype), np.empty(n)
         parameters: list[FloatArray] = [np.empty(n, dtype=dtype) for _ in self.used]
         for first in range(0, n, BLOCK):
             part = slice(first, first + BLOCK)
-            back = self.points.part(part).range_derivatives(rx_m, order)
-            phases = Phases.of(self.block, [a + b for a, b in zip(self.to_tx[:, part], back, strict=True)], self.used)
+            points, to_tx = self.points.part(part), [d[part] for d in self.to_tx]
+            phases = _phases(self.block, points, to_tx, rx_m, self.used, dtype)
             fast[part], slow[part], constant[part] = phases.fast, phases.slow, phases.constant
             for x, r, m, h in zip(parameters, phases.residuals, self.middle, self.half, strict=True):
                 x[part] = (r - m) / h
         axes = _Axes.of(self.block, fast, slow, self.centre)
-        amplitude = _times_phasor(self.points.amplitude, constant, axes.flips, coarse)
+        amplitude = _times_phasor(self.points.amplitude, constant, axes.flips, dtype)
         return self._sum(axes, self.form.strengths(amplitude, parameters)).reshape(self.block.time.shape)
 
     def _sum(self, axes: _Axes, rows: ComplexArray) -> ComplexArray:
@@ -140,7 +140,9 @@ class Prepared:
             tolerance = min(self.kernels[r].tolerance for r in chosen)
             at_samples = series(tolerance, single, shape, *self.block.unit_targets)
             for r in chosen:
-                total += at_samples(self.kernels[r].spread(shape, x, y, rows[r])) * self.waves[r]
+                grid = np.empty(shape, dtype=self.kernels[r].dtype)
+                self.kernels[r].spread(x, y, rows[r], grid)
+                total += at_samples(grid) * self.waves[r]
         return total
 
 
@@ -153,21 +155,26 @@ def _probes(rx_m: FloatArray) -> FloatArray:
     return rx_m[[middle, *(i for i in extremes if i != middle)]]
 
 
-def _phases(block: Block, points: MovedPoints, to_tx: FloatArray, rx_m: FloatArray, used: tuple[int, ...]) -> Phases:
-    """Return the phases at one receiver."""
-    both = [a + b for a, b in zip(to_tx, points.range_derivatives(rx_m, 4), strict=True)]
-    return Phases.of(block, both, used)
+def _phases(
+    block: Block,
+    points: MovedPoints,
+    to_tx: list[FloatArray],
+    rx_m: FloatArray,
+    used: tuple[int, ...],
+    dtype: DTypeLike = np.float64,
+) -> Phases:
+    """Return the phases at one receiver, small ones in the precision asked for."""
+    back = points.range_derivatives(rx_m, len(to_tx) - 1, dtype)
+    return Phases.of(block, [a + b for a, b in zip(to_tx, back, strict=True)], used)
 
 
-def _sample_rows(residuals: FloatArray) -> IntArray:
+def _sample_rows(residuals: list[FloatArray]) -> IntArray:
     """Choose echoes that stand for all: evenly spread rows, and the extremes of every residual and of pair sums."""
-    n = residuals.shape[1]
-    rows = [np.unique(np.linspace(0, n - 1, SAMPLED_ECHOES).astype(int))]
+    n = len(residuals[0])
+    rows = [np.linspace(0, n - 1, min(n, SAMPLED_ECHOES)).astype(int)]
     if n > SAMPLED_ECHOES:
-        spread = residuals / (np.ptp(residuals, axis=1, keepdims=True) + 1e-300)
-        pairs = itertools.combinations(spread[:2], 2)
-        for x in [*spread, *(a + sign * b for a, b in pairs for sign in (1, -1))]:
-            rows.append(np.array([x.argmin(), x.argmax()]))
+        a, b = (x / max(float(np.ptp(x)), 1e-300) for x in residuals[:2])
+        rows += [np.array([x.argmin(), x.argmax()]) for x in (*residuals, a + b, a - b)]
     found: IntArray = np.unique(np.concatenate(rows))
     return found
 
@@ -217,11 +224,17 @@ class _Axes:
         return fast, slow
 
 
-def _times_phasor(amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, single: bool) -> ComplexArray:
-    """Return amplitude exp(j 2 pi cycles), in single precision where that is enough."""
+def _precision(accuracy: float) -> DTypeLike:
+    """Return what is enough for small phases, and for phasors."""
+    return np.float32 if accuracy * TRANSFORM_SHARE >= SINGLE_ACCURACY else np.float64
+
+
+def _times_phasor(
+    amplitude: ComplexArray, cycles: FloatArray, flips: FloatArray | None, dtype: DTypeLike
+) -> ComplexArray:
+    """Return amplitude exp(j 2 pi cycles), in the precision asked for."""
     turn = cycles if flips is None else cycles + flips
     turn = turn - np.rint(turn)
-    dtype: DTypeLike = np.float32 if single else np.float64
     phasor = _phasor(TAU * turn.astype(dtype, copy=False))
     phasor *= amplitude.astype(phasor.dtype, copy=False)
     return phasor
