@@ -41,11 +41,12 @@ HEAD = """\
 `shenron-rt explain RUN` prints the strongest peak of every frame of any run, and whose it is.)
 
 Strongest cell of the range-azimuth map beyond 2 m. Each frame has its own seed and moves the first car by up to 2 m
-along and across and 5 degrees of yaw. A wall cell is speckle of a few looks, so not every frame without the azimuth
-pattern picks a wall. A foreign car is one painted shell of flat facets: where these are longer than what its curvature
-and the wavelength allow, its first bounce fades from aspect to aspect by more than the 9.6 dB that the pattern takes
-from the walls. What its recesses, and the road before it, send back over several bounces fills these fades; with them
-some of the strongest cells are true ghosts of the car, in a wall, and count as other.
+along and across and 5 degrees of yaw. Beyond 60 degrees `braking` has walls, whose cells are speckle, and a bollard,
+whose echo is the same in every frame to a decibel; the pattern takes 12.6 dB from it, from above the car to below. A
+foreign car is one painted shell of flat facets: where these are longer than what its curvature and the wavelength
+allow, its first bounce fades from aspect to aspect by more than that. What its recesses, and the road before it, send
+back over several bounces fills these fades; with them some of the strongest cells are true ghosts of the car, in a
+wall, and count as other.
 
 """
 OBJECTS_HEAD = """

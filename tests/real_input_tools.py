@@ -12,6 +12,7 @@ import yaml
 
 import shenron_rt as srt
 from shenron_rt.frames import Pose, from_carla_points, from_carla_pose
+from shenron_rt.run_summary import objects_summary
 from shenron_rt.scene.mesh import TaggedMesh, concatenate
 from shenron_rt.scene.readers import read_mesh
 from shenron_rt.scene.resolver import resolve_tags
@@ -127,14 +128,13 @@ def _alone(frame: srt.Frame, mine: np.ndarray) -> srt.RadarCube:
 
 
 def own_snr_db(frame: srt.Frame, object_id: int) -> float:
-    """Return an object's own SNR: its strongest beamformed cell, alone and noise-free, over the noise of that cell.
+    """Return an object's own SNR as the command line prints it and ``summary.json`` has it.
 
-    This is what ``snr_db`` of a detection on it means. The power summed over the object lies higher where the object
-    fills several cells, and says nothing of how this frame's speckle adds up.
+    The power of the whole object, as a point on the centre of its cells would have it. In its strongest cell an object
+    of several cells has less, and in a frame whose speckle cancels there, much less.
     """
-    cube = _alone(frame, frame.returns.object_id == object_id)
-    noise = frame.cube.noise_power_w / len(cube.azimuth_channels)
-    return float(10 * np.log10(cube.range_azimuth.max() / noise))
+    records = objects_summary(frame.returns, frame.cube, frame.detections)
+    return float(next(r["snr_db"] for r in records if r["id"] == object_id))
 
 
 def rival_db(frame: srt.Frame, object_id: int) -> float:

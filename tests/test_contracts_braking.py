@@ -1,4 +1,4 @@
-"""Scene ``braking``: with the azimuth pattern the car is the strongest cell, without it the near ends of the walls."""
+"""Scene ``braking``: with the azimuth pattern the car is the strongest cell, without it what is beyond 60 degrees."""
 
 from __future__ import annotations
 
@@ -34,32 +34,28 @@ def rate(radar: str, seeds: range, data: Path | None = None) -> tuple[int, int]:
     return sum(r[0] for r in rows), sum(r[1] for r in rows)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_strongest_cell_is_the_braking_car_at_its_range_and_azimuth(seed: int) -> None:
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=[] if k < 5 else pytest.mark.slow) for k in range(SEEDS)])
+def test_strongest_cell_is_the_car_and_without_the_azimuth_pattern_beyond_60_degrees(seed: int) -> None:
     assert evidence(PATTERN, seed)[0]
+    assert evidence(ISOTROPIC, seed)[1]
+    assert evidence(NO_AZIMUTH, seed)[1]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5, SEEDS))
-def test_strongest_cell_is_the_braking_car_for_every_seed(seed: int) -> None:
-    assert evidence(PATTERN, seed)[0]
-
-
-def test_isotropic_radar_is_drawn_to_the_walls_by_what_the_pattern_took() -> None:
-    seeds = range(5)
-    mean = {r: np.mean([evidence(r, s)[2] for s in seeds]) for r in (PATTERN, ISOTROPIC)}
-    # 76 degrees off boresight a beam of 120 degrees takes 2 * 3 dB * (76 / 60)^2 = 9.6 dB. Strongest cells of speckle
-    # scatter by 4 dB a frame, so the ratio of two means of five by 4 * sqrt(2 / 5) = 2.5 dB: two of these.
-    assert db(mean[ISOTROPIC] / mean[PATTERN]) == pytest.approx(9.6, abs=5.0)
-    assert rate(ISOTROPIC, seeds)[1] >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("radar", "least"), [(ISOTROPIC, 14), (NO_AZIMUTH, 8)])
-def test_without_the_azimuth_pattern_most_frames_pick_a_wall_beyond_60_degrees(radar: str, least: int) -> None:
-    # A wall cell is speckle of a few looks (3 to 5 dB), the car's echo varies by 2.4 dB with range: not every draw
-    # of a margin of a few dB comes out the same way; the rates are in docs/evidence.md.
-    assert rate(radar, range(SEEDS))[1] >= least
+def test_azimuth_pattern_takes_the_bollard_from_above_the_car_to_below_it() -> None:
+    scene = srt.load_scene("braking")
+    level = {r: srt.simulate(scene, twin(**RADARS[r]), **FAST).returns.power_by_object() for r in RADARS}
+    # 2 * 3 dB * (87 / 60)^2 = 12.6 dB at the middle of the bollard, in the radar's own height; 1.3 degrees aside, at
+    # its rims, 0.4 dB more or less. A beam of 360 degrees still takes 2 * 3 dB * (87 / 180)^2 = 1.4 dB.
+    assert db(level[ISOTROPIC][44] / level[PATTERN][44]) == pytest.approx(12.6, abs=0.4)
+    assert db(level[NO_AZIMUTH][44] / level[PATTERN][44]) == pytest.approx(11.2, abs=0.4)
+    assert level[PATTERN][44] < level[PATTERN][101] < level[NO_AZIMUTH][44]
+    # a cylinder's pi a R |Gamma|^2 in the radar equation; cells that its rims and its top cut scatter by 0.9 dB
+    radar = twin(**RADARS[ISOTROPIC])
+    normal, _ = srt.load_materials()["plastic"].reflection(radar.center_hz, 1.0)
+    sigma = np.pi * 0.07 * 3.0 * abs(normal) ** 2
+    gains = 10 ** ((radar.antenna.gain_tx_dbi + radar.antenna.gain_rx_dbi) / 10)
+    expected = radar.tx_power_w * gains * radar.wavelength_m**2 * sigma / ((4 * np.pi) ** 3 * 3.0**4)
+    assert db(level[ISOTROPIC][44] / expected) == pytest.approx(0.0, abs=2.0)
 
 
 def test_chrono_sedan_is_detected_between_the_walls(shared_data: Path) -> None:
@@ -79,7 +75,9 @@ def test_azimuth_pattern_takes_the_walls_down_beside_the_chrono_sedan_too(shared
     for radar in (PATTERN, ISOTROPIC):
         rows = [evidence(radar, seed, shared_data) for seed in seeds]
         gain[radar] = np.mean([r[2] for r in rows]) / np.mean([r[3] for r in rows])
-    # the car is on boresight; two means of twenty strongest speckle cells scatter by 4 * sqrt(2 / 20) = 1.3 dB
-    assert db(gain[ISOTROPIC] / gain[PATTERN]) == pytest.approx(9.6, abs=3.0)
+    # The car is on boresight, the strongest cell beyond 60 degrees of the isotropic radar the bollard's, 12.6 dB above
+    # itself with the pattern; where a wall is above it there, 9.6 dB below itself without, the ratio is smaller, but
+    # not below that. Cells of bollard and wall scatter by 1 dB, two means of twenty by 0.3 dB: two of these.
+    assert 9.6 - 0.6 < db(gain[ISOTROPIC] / gain[PATTERN]) < 12.6 + 0.6
     assert rate(PATTERN, seeds, shared_data)[0] > rate(ISOTROPIC, seeds, shared_data)[0]
     assert rate(ISOTROPIC, seeds, shared_data)[1] >= 16

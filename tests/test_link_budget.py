@@ -118,7 +118,13 @@ SPHERE_M = 0.1
 
 @pytest.mark.parametrize(
     ("profile", "range_m", "seed"),
-    [("awrl1432", 10.0, 0), ("awrl1432", 20.0, 1), ("awrl1432", 40.0, 2), ("awrl1432_137mhz", 150.0, 4)],
+    [
+        *(("awrl1432", 10.0, seed) for seed in range(4)),
+        ("awrl1432", 20.0, 1),
+        ("awrl1432", 40.0, 2),
+        ("awrl1432", 90.0, 3),
+        ("awrl1432_137mhz", 150.0, 4),
+    ],
 )
 def test_a_metal_sphere_follows_the_radar_equation_from_its_specular_point(
     profile: str, range_m: float, seed: int
@@ -141,7 +147,7 @@ def test_a_metal_sphere_is_detected_at_its_specular_point_with_its_rcs() -> None
 
 
 def _sphere(profile: str, range_m: float, seed: int) -> srt.Frame:
-    ball = {"id": 5, "shape": f"sphere:r={SPHERE_M}", "material": "metal", "tag": "Other", "aim": 40_000}
+    ball = {"id": 5, "shape": f"sphere:r={SPHERE_M}", "material": "metal", "tag": "Other", "aim": 80_000}
     return render(profile, {"actors": [ball | {"xyz_m": (range_m + SPHERE_M, 0, 0)}]}, seed=seed)
 
 

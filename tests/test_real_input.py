@@ -23,7 +23,7 @@ from shenron_rt.scene.readers import read_mesh
 from shenron_rt.scene.resolver import resolve_tags
 from shenron_rt.tags import SemanticTag
 
-#: Objects whose strongest cell, alone and without noise, is weaker than this need not be detected.
+#: Objects whose own SNR, as the command line prints it, is lower than this need not be detected.
 NEEDED_SNR_DB = 15.0
 
 #: Where each stands ahead of the radar and to its left [m]: small ones near, large ones behind and above them.
