@@ -157,12 +157,22 @@ def _body(
     if not keep.all():
         mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
     mesh = rounding.of(entry, mesh)
-    object_id = int(getattr(entry, "id", 0))
-    face_tag, face_material, face_link = part_tag[mesh.part], index[mesh.part], parts.part_link[mesh.part]
-    mesh, vertex_link = _unshared(mesh, face_link)
-    plane = _planes(mesh, face_material, face_link)
-    patch: FloatArray = np.bincount(plane, weights=mesh.face_area)[plane].astype(np.float64)
-    return Body(object_id, entry, mesh, face_tag, face_material, plane, patch, parts.links, face_link, vertex_link)
+    tag = part_tag[mesh.part]
+    mesh, vertex_link, plane, patch = _surfaces(mesh, tuple(index.tolist()), tuple(parts.part_link.tolist()))
+    object_id, face_link = int(getattr(entry, "id", 0)), parts.part_link[mesh.part]
+    return Body(object_id, entry, mesh, tag, index[mesh.part], plane, patch, parts.links, face_link, vertex_link)
+
+
+@functools.lru_cache(maxsize=4)
+def _surfaces(
+    mesh: TaggedMesh, part_material: tuple[int, ...], part_link: tuple[int, ...]
+) -> tuple[TaggedMesh, IntArray, IntArray, FloatArray]:
+    """Return the mesh with its links apart, the link of each vertex, and plane and patch of each face."""
+    face_link = np.array(part_link, dtype=np.int32)[mesh.part]
+    apart, vertex_link = _unshared(mesh, face_link)
+    plane = _planes(apart, np.array(part_material, dtype=np.uint16)[mesh.part], face_link)
+    patch: FloatArray = np.bincount(plane, weights=apart.face_area)[plane].astype(np.float64)
+    return apart, vertex_link, plane, patch
 
 
 def _unshared(mesh: TaggedMesh, face_link: IntArray) -> tuple[TaggedMesh, IntArray]:

@@ -67,6 +67,6 @@ class Rounding:
         )
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=4)
 def _rounded(mesh: TaggedMesh, tolerance_m: float, below_deg: float, most: int) -> TaggedMesh:
     return round_mesh(mesh, tolerance_m, below_deg=below_deg, most_faces=most)
