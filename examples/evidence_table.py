@@ -48,8 +48,7 @@ pattern picks a wall. A foreign car is one painted shell of flat facets: where t
 and the wavelength allow, its first bounce fades from aspect to aspect by more than the 9.6 dB that the pattern takes
 from the walls. Rounded (`round_below_deg`) its mean is what its curvature makes of it; it still has few glints, whose
 sum fades. Over several bounces recesses, and the road before it, send back more; with them some of the strongest cells
-are true ghosts of the car, in a wall, and count as other. Flat facets mirror whole tubes on to the next surface, round
-ones a part: over several bounces the rounded car is the strongest cell less often than the one of flat facets.
+are true ghosts of the car, in a wall, and count as other.
 
 """
 OBJECTS_HEAD = """
