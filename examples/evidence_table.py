@@ -2,8 +2,8 @@
 
 Prints the strongest cell of the range-azimuth map beyond 2 m, frame by frame, with the radar's antenna pattern and
 without its azimuth part, how often it is the car, and every object's power. ``--car NAME=FILE`` puts another car's mesh
-(ROS axes, metres) beside the bundled one, by its first bounce and by up to three; ``--out docs/evidence.md`` writes the
-page. About 0.5 s a frame and radar.
+(ROS axes, metres) beside the bundled one: as it is and rounded, by its first bounce and by up to three; ``--out
+docs/evidence.md`` writes the page. About 0.5 s a frame and radar, some seconds where a car is rounded.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import argparse
 import logging
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,8 @@ BLANKING_M = 2.0
 OPTIONS: dict[str, Any] = {"rays": 60_000, "accuracy": 1e-3}
 #: Surfaces along a path, for foreign cars a second time.
 FURTHER_BOUNCES = 3
+#: Facets of foreign cars that meet at less are rounded, in variants of their own.
+ROUND_BELOW_DEG = 30.0
 #: Half the bundled car's length: another car takes its place tail on tail.
 HALF_LENGTH_M = 2.25
 
@@ -44,9 +46,9 @@ Strongest cell of the range-azimuth map beyond 2 m. Each frame has its own seed 
 along and across and 5 degrees of yaw. Beyond 60 degrees `braking` has walls, whose cells are speckle, and a bollard,
 whose echo is the same in every frame to a decibel; the pattern takes 12.6 dB from it, from above the car to below. A
 foreign car is one painted shell of flat facets: where these are longer than what its curvature and the wavelength
-allow, its first bounce fades from aspect to aspect by more than that. What its recesses, and the road before it, send
-back over several bounces fills these fades; with them some of the strongest cells are true ghosts of the car, in a
-wall, and count as other.
+allow, its first bounce fades from aspect to aspect by more than that. Rounded (`round_below_deg`) its mean is what its
+curvature makes of it; it still has few glints, whose sum fades. Over several bounces recesses, and the road before it,
+send back more; with them some of the strongest cells are true ghosts of the car, in a wall, and count as other.
 
 """
 OBJECTS_HEAD = """
@@ -57,6 +59,26 @@ its strongest detection. Object `static` is everything without an id, spread ove
 """
 
 
+class Car(NamedTuple):
+    """A car that stands in for a scene's first actor, and how it is looked at; without a mesh it is the scene's own."""
+
+    name: str
+    mesh: TaggedMesh | None = None
+    bounces: int = 1
+    round_below_deg: float | None = None
+
+
+def variants(name: str, mesh: TaggedMesh) -> list[Car]:
+    """Return a foreign car as it is and rounded, by its first bounce and by several."""
+    more = f"up to {FURTHER_BOUNCES} bounces"
+    return [
+        Car(name, mesh),
+        Car(f"{name}, {more}", mesh, FURTHER_BOUNCES),
+        Car(f"{name}, rounded", mesh, 1, ROUND_BELOW_DEG),
+        Car(f"{name}, rounded, {more}", mesh, FURTHER_BOUNCES, ROUND_BELOW_DEG),
+    ]
+
+
 def car_mesh(file: Path) -> TaggedMesh:
     """Return a car's mesh with its origin on the ground below the middle of its box."""
     mesh = resolve_tags(read_mesh(file))
@@ -65,8 +87,9 @@ def car_mesh(file: Path) -> TaggedMesh:
     return mesh.transformed(srt.Pose((-middle[0], -middle[1], -low[2])))
 
 
-def swapped(scene: srt.Scene, mesh: TaggedMesh | None) -> srt.Scene:
+def swapped(scene: srt.Scene, other: Car) -> srt.Scene:
     """Return the scene with its first actor's shape replaced."""
+    mesh = other.mesh
     if mesh is None or not scene.actors:
         return scene
     car = scene.actors[0]
@@ -74,8 +97,8 @@ def swapped(scene: srt.Scene, mesh: TaggedMesh | None) -> srt.Scene:
     ahead = float(np.ptp(mesh.bounds[:, 0])) / 2 - HALF_LENGTH_M
     x, y, z = car.xyz_m
     place = (x + ahead * np.cos(yaw), y + ahead * np.sin(yaw), z)
-    other = type(car)(**{**car.model_dump(), "shape": None, "mesh": mesh, "xyz_m": place})
-    return scene.model_copy(update={"actors": (other, *scene.actors[1:])})
+    changed = {"shape": None, "mesh": mesh, "round_below_deg": other.round_below_deg, "xyz_m": place}
+    return scene.model_copy(update={"actors": (type(car)(**{**car.model_dump(), **changed}), *scene.actors[1:])})
 
 
 def perturbed(scene: srt.Scene, frame: int) -> srt.Scene:
@@ -106,27 +129,32 @@ def strongest(frame: srt.Frame) -> tuple[float, float, float, str]:
     return distance, azimuth, float(10 * np.log10(power.max())) + 30, whose
 
 
-def frame_of(scene: srt.Scene, radar: str, frame: int, bounces: int) -> srt.Frame:
-    """Render one frame of a perturbed scene; the frame's number is its seed."""
-    profile = srt.load_profile("awrl1432", RADARS[radar])
-    return srt.simulate(perturbed(scene, frame), profile, seed=frame, max_bounces=bounces, **OPTIONS)
+def found_by(scene: srt.Scene, frame: int, bounces: int) -> dict[str, tuple[float, float, float, str]]:
+    """Return what each radar finds strongest in one frame of a perturbed scene; the frame's number is its seed."""
+    moved = perturbed(scene, frame)  # one scene for all radars: its search trees are built once
+    profiles = {radar: srt.load_profile("awrl1432", keys) for radar, keys in RADARS.items()}
+    return {
+        radar: strongest(srt.simulate(moved, profile, seed=frame, max_bounces=bounces, **OPTIONS))
+        for radar, profile in profiles.items()
+    }
 
 
-def strongest_rows(scene: srt.Scene, car: str, bounces: int, shown: int, frames: int) -> Iterator[str]:
+def strongest_rows(name: str, car: Car, shown: int, frames: int) -> Iterator[str]:
     """Yield the rows of the first frames, and the rates over all."""
-    rates = []
+    rates, scene = [], swapped(srt.load_scene(name), car)
+    found = [found_by(scene, k, car.bounces) for k in range(frames)]
     for radar in RADARS:
-        found = [strongest(frame_of(scene, radar, k, bounces)) for k in range(frames)]
-        for k, (distance, azimuth, level, whose) in enumerate(found[:shown]):
-            yield f"| {scene.name} | {car} | {k} | {radar} | {distance:.2f} | {azimuth:.1f} | {level:.1f} | {whose} |"
-        count = {w: sum(f[3] == w for f in found) for w in ("car", "beyond 60 deg")}
+        for k, (distance, azimuth, level, whose) in enumerate(f[radar] for f in found[:shown]):
+            cell = f"{distance:.2f} | {azimuth:.1f} | {level:.1f} | {whose}"
+            yield f"| {scene.name} | {car.name} | {k} | {radar} | {cell} |"
+        count = {w: sum(f[radar][3] == w for f in found) for w in ("car", "beyond 60 deg")}
         rates.append(f"{count['car']} car, {count['beyond 60 deg']} beyond 60 deg with {radar}")
-    yield f"| {scene.name} | {car} | all {frames} | | | | | {'; '.join(rates)} |"
+    yield f"| {scene.name} | {car.name} | all {frames} | | | | | {'; '.join(rates)} |"
 
 
-def object_rows(scene: srt.Scene, car: str, bounces: int) -> Iterator[str]:
+def object_rows(scene: srt.Scene, car: Car) -> Iterator[str]:
     """Yield a row an object: its power, SNR after the whole cube's integration, and what was detected of it."""
-    frame = srt.simulate(scene, max_bounces=bounces, **OPTIONS)
+    frame = srt.simulate(scene, max_bounces=car.bounces, **OPTIONS)
     p, table, names = frame.profile, frame.detections.table, scene.object_names()
     noise = p.noise_power_w / (p.waveform.samples * p.waveform.chirps * p.n_virtual)
     for key, power in frame.returns.power_by_object().items():
@@ -137,25 +165,25 @@ def object_rows(scene: srt.Scene, car: str, bounces: int) -> Iterator[str]:
             d = mine[0]
             seen = f"{d['range']:.2f} m, {np.degrees(d['azimuth']):.1f} deg, {d['velocity']:.2f} m/s"
             seen += ", folded" if d["ambiguous"] else ""
-        yield f"| {scene.name} | {car} | {names.get(key, key)} | {level:.1f} | {snr:.1f} | {seen} |"
+        yield f"| {scene.name} | {car.name} | {names.get(key, key)} | {level:.1f} | {snr:.1f} | {seen} |"
 
 
-def page(cars: list[tuple[str, TaggedMesh | None, int]], shown: int, frames: int) -> Iterator[str]:
+def page(cars: list[Car], shown: int, frames: int) -> Iterator[str]:
     """Yield the lines of the page."""
     yield from HEAD.splitlines()
     yield "| scene | car | frame | radar | range m | azimuth deg | level dBm | whose |"
     yield "|---|---|---|---|---|---|---|---|"
     for name in ("braking", "tree_wall"):
-        for car, mesh, bounces in cars:
-            yield from strongest_rows(swapped(srt.load_scene(name), mesh), car, bounces, shown, frames)
+        for car in cars:
+            yield from strongest_rows(name, car, shown, frames)
     yield from OBJECTS_HEAD.splitlines()
     yield "| scene | car | object | power dBm | SNR dB | strongest detection |"
     yield "|---|---|---|---|---|---|"
     for name in SCENES:
         scene = srt.load_scene(name)
-        for car, mesh, bounces in cars:
-            if mesh is None or scene.actors:
-                yield from object_rows(swapped(scene, mesh), car, bounces)
+        for car in cars:
+            if car.mesh is None or scene.actors:
+                yield from object_rows(swapped(scene, car), car)
 
 
 def main() -> None:
@@ -167,10 +195,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="write here instead of printing")
     asked = parser.parse_args()
     logging.disable(logging.WARNING)
-    cars: list[tuple[str, TaggedMesh | None, int]] = [("bundled", None, 1)]
+    cars = [Car("bundled")]
     for name, _, file in (text.partition("=") for text in asked.car):
-        mesh = car_mesh(Path(file))
-        cars += [(name, mesh, 1), (f"{name}, up to {FURTHER_BOUNCES} bounces", mesh, FURTHER_BOUNCES)]
+        cars += variants(name, car_mesh(Path(file)))
     lines = []
     for line in page(cars, asked.shown, asked.frames):
         lines.append(line)

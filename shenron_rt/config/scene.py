@@ -96,7 +96,10 @@ class Moving(Placed):
 
 
 class MeshSource(Placed):
-    """A mesh file or a ready-made shape, and what is known of its tags and materials."""
+    """A mesh file or a ready-made shape, and what is known of its tags, its materials and its round surfaces.
+
+    ``round_below_deg`` rounds what facets stand for where they meet at less than this; None leaves them as they are.
+    """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
@@ -111,6 +114,7 @@ class MeshSource(Placed):
     tag: str | None = None
     material: str | None = None
     aim: Annotated[int, Field(ge=1)] | None = None
+    round_below_deg: Annotated[float, Field(gt=0, le=90)] | None = None
 
     _tag = field_validator("tag")(_known_tag)
 

@@ -82,12 +82,13 @@ class Articulated:
         As it is before any link has moved.
     links : tuple of Link
         The first is the body.
-    face_link : (f,) int32
+    part_link : (p,) int32
+        Row of ``links`` for each part of the mesh.
     """
 
     mesh: TaggedMesh
     links: tuple[Link, ...]
-    face_link: IntArray
+    part_link: IntArray
 
 
 def articulated(entry: MeshSource, mesh: TaggedMesh) -> Articulated:
@@ -119,7 +120,7 @@ def articulated(entry: MeshSource, mesh: TaggedMesh) -> Articulated:
             raise InputError(f"{entry.name or 'actor'}: no part is named {pattern!r}; the mesh has: {names}")
         link_of_part[mine] = len(links)
         links.append(Link(pattern, motion))
-    return Articulated(mesh, tuple(links), link_of_part[mesh.part])
+    return Articulated(mesh, tuple(links), link_of_part)
 
 
 def _is(pattern: str, name: str) -> bool:

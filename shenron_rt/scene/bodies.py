@@ -17,6 +17,7 @@ from ..errors import InputError, did_you_mean
 from ..tags import SemanticTag, parse_tag
 from .articulation import Link, articulated
 from .mesh import TaggedMesh
+from .rounded import Rounding
 
 __all__ = ["Body", "load_bodies", "source_mesh"]
 
@@ -118,24 +119,26 @@ def _file(
 
 
 def load_bodies(scene: Scene) -> tuple[tuple[Body, ...], MaterialTable]:
-    """Load every mesh of a scene and give each face its tag and material.
+    """Load every mesh of a scene, round it where that is asked for, and give each face its tag and material.
 
     Raises
     ------
     InputError
-        An unknown material or tag, naming the part.
+        An unknown material or tag, naming the part; more triangles than rounding may make.
     """
     materials = load_materials(scene.materials)
     names = list(materials.materials)
-    entries = [*scene.static, *scene.actors]
-    bodies = (_body(entry, scene.folder, materials, names) for entry in entries)
+    entries, rounding = [*scene.static, *scene.actors], Rounding(scene)
+    bodies = (_body(entry, scene.folder, materials, names, rounding) for entry in entries)
     return tuple(body for body in bodies if body is not None), materials
 
 
-def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list[str]) -> Body | None:
+def _body(
+    entry: MeshSource, folder: Path, materials: MaterialTable, names: list[str], rounding: Rounding
+) -> Body | None:
     """Return one entry's body without its sky, or None where that is all it has."""
     parts = articulated(entry, source_mesh(entry, folder))
-    mesh, face_link = parts.mesh, parts.face_link
+    mesh = parts.mesh
     wanted = entry.tag and parse_tag(entry.tag)
     tags = [wanted or part.tag for part in mesh.parts]
     material_of = [
@@ -147,20 +150,29 @@ def _body(entry: MeshSource, folder: Path, materials: MaterialTable, names: list
             where = f"{entry.name or 'mesh'}, part {part.label!r}"
             raise InputError(f"{where}: unknown material {material!r}; {did_you_mean(str(material), names)}")
     index = np.array([names.index(str(m)) for m in material_of], dtype=np.uint16)
-    face_tag = np.array([int(t) for t in tags], dtype=np.uint8)[mesh.part]
-    keep = face_tag != int(SemanticTag.Sky)
+    part_tag = np.array([int(t) for t in tags], dtype=np.uint8)
+    keep = part_tag[mesh.part] != int(SemanticTag.Sky)
     if not keep.any():
         return None
     if not keep.all():
-        mesh, face_link = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep]), face_link[keep]
-    object_id = int(getattr(entry, "id", 0))
-    face_material = index[mesh.part]
-    mesh, vertex_link = _unshared(mesh, face_link)
-    plane = _planes(mesh, face_material, face_link)
-    patch: FloatArray = np.bincount(plane, weights=mesh.face_area)[plane].astype(np.float64)
-    return Body(
-        object_id, entry, mesh, face_tag[keep], face_material, plane, patch, parts.links, face_link, vertex_link
-    )
+        mesh = replace(mesh, faces=mesh.faces[keep], part=mesh.part[keep])
+    mesh = rounding.of(entry, mesh)
+    tag = part_tag[mesh.part]
+    mesh, vertex_link, plane, patch = _surfaces(mesh, tuple(index.tolist()), tuple(parts.part_link.tolist()))
+    object_id, face_link = int(getattr(entry, "id", 0)), parts.part_link[mesh.part]
+    return Body(object_id, entry, mesh, tag, index[mesh.part], plane, patch, parts.links, face_link, vertex_link)
+
+
+@functools.lru_cache(maxsize=4)
+def _surfaces(
+    mesh: TaggedMesh, part_material: tuple[int, ...], part_link: tuple[int, ...]
+) -> tuple[TaggedMesh, IntArray, IntArray, FloatArray]:
+    """Return the mesh with its links apart, the link of each vertex, and plane and patch of each face."""
+    face_link = np.array(part_link, dtype=np.int32)[mesh.part]
+    apart, vertex_link = _unshared(mesh, face_link)
+    plane = _planes(apart, np.array(part_material, dtype=np.uint16)[mesh.part], face_link)
+    patch: FloatArray = np.bincount(plane, weights=apart.face_area)[plane].astype(np.float64)
+    return apart, vertex_link, plane, patch
 
 
 def _unshared(mesh: TaggedMesh, face_link: IntArray) -> tuple[TaggedMesh, IntArray]:

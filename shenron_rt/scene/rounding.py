@@ -23,7 +23,7 @@ from ..errors import InputError
 from .mesh import TaggedMesh
 from .smooth import smooth_groups
 
-__all__ = ["round_mesh"]
+__all__ = ["TooManyFacesError", "round_mesh"]
 
 #: Normals at an edge that differ by less than about this are one: a curve of second degree cannot turn both ways [rad].
 _ALIKE = 0.06
@@ -33,7 +33,13 @@ _MOST_BEND = 0.125
 _MOST_FACES = 20_000_000
 
 
-def round_mesh(mesh: TaggedMesh, tolerance_m: float, *, below_deg: float = 30.0) -> TaggedMesh:
+class TooManyFacesError(InputError):
+    """The round surface needs more faces than are allowed."""
+
+
+def round_mesh(
+    mesh: TaggedMesh, tolerance_m: float, *, below_deg: float = 30.0, most_faces: int | None = None
+) -> TaggedMesh:
     """Return a mesh with its round surfaces cut finely; what is flat stays as it is.
 
     Parameters
@@ -46,6 +52,8 @@ def round_mesh(mesh: TaggedMesh, tolerance_m: float, *, below_deg: float = 30.0)
     below_deg : float
         Faces that meet at less than this belong to one round surface, as do those connected through such; edges that
         bend more stay edges. 0 to 90.
+    most_faces : int, optional
+        Of the result; a finer one is refused while it is made. 20 million.
 
     Returns
     -------
@@ -55,7 +63,7 @@ def round_mesh(mesh: TaggedMesh, tolerance_m: float, *, below_deg: float = 30.0)
     Raises
     ------
     InputError
-        A tolerance or an angle out of bounds, or more than 20 million faces needed.
+        A tolerance or an angle out of bounds; as :class:`TooManyFacesError` where more faces are needed.
 
     Notes
     -----
@@ -67,7 +75,7 @@ def round_mesh(mesh: TaggedMesh, tolerance_m: float, *, below_deg: float = 30.0)
     if not 0.0 < below_deg <= 90.0:
         raise InputError(f"round_mesh: below_deg {below_deg}; allowed: above 0, to 90")
     patch = _patches(mesh, np.radians(below_deg))
-    face, place = _cut(patch, tolerance_m)
+    face, place = _cut(patch, tolerance_m, _MOST_FACES if most_faces is None else most_faces)
     points = _at(mesh.vertices[mesh.faces][face[:, None]], patch[face[:, None]], place)
     corners = np.arange(3 * len(face)).reshape(-1, 3)
     loose = replace(mesh, vertices=points.reshape(-1, 3), faces=corners, part=mesh.part[face])
@@ -134,7 +142,7 @@ def _at(points: FloatArray, bend: FloatArray, place: FloatArray) -> FloatArray:
     return np.asarray(flat - np.einsum("...k,...ki->...i", place * following, bend))
 
 
-def _cut(bend: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
+def _cut(bend: FloatArray, tolerance: float, most: int) -> tuple[IntArray, FloatArray]:
     """Cut patches at the middles of their edges until none leaves its chord by more than the tolerance.
 
     Returns
@@ -147,19 +155,19 @@ def _cut(bend: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
     done: list[tuple[IntArray, FloatArray]] = []
     face = np.arange(len(bend))
     place = np.broadcast_to(np.eye(3), (len(bend), 3, 3))
-    count = len(bend)
+    count = 0
     while len(face):
         step = np.roll(place, -1, axis=1) - place
         off = np.einsum("mek,mki->mei", step * np.roll(step, -1, axis=2), bend[face]) / 4.0
         open_ = np.linalg.norm(off, axis=2) > tolerance
         fine = ~open_.any(axis=1)
         done.append((face[fine], place[fine]))
-        face, place = _split(face[~fine], place[~fine], open_[~fine])
-        count += len(face)
-        if count > _MOST_FACES:
-            raise InputError(
-                f"round_mesh: a tolerance of {tolerance:g} m needs more than {_MOST_FACES} faces; take a larger one"
+        count += int(fine.sum())
+        if count + int(open_.sum()) + int((~fine).sum()) > most:  # an open edge makes a face more of its triangle
+            raise TooManyFacesError(
+                f"round_mesh: a tolerance of {tolerance:g} m needs more than {most} faces; take a larger one"
             )
+        face, place = _split(face[~fine], place[~fine], open_[~fine])
     return np.concatenate([f for f, _ in done]), np.concatenate([p for _, p in done])
 
 
