@@ -116,6 +116,15 @@ def test_nufft_holds_for_many_echoes_in_shared_groups(only_nufft, rng):
         assert relative_error(found, exact) <= accuracy
 
 
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
+def test_many_echoes_at_rest_have_no_curvature_to_be_scaled_by(accuracy, only_nufft, rng):
+    profile = make_profile(chirps=4)
+    position = rng.uniform([5, -20, -1], [80, 20, 2], (400, 3))
+    returns = make_returns(position, amplitude=rng.normal(size=400) + 1j * rng.normal(size=400))
+    exact = synthesize(returns, profile, noise=None, method="direct").data
+    assert relative_error(synthesize(returns, profile, noise=None, accuracy=accuracy).data, exact) <= accuracy
+
+
 def test_accuracy_holds_relative_to_a_cube_that_cancels(only_nufft, rng):
     profile = make_profile(chirps=16, samples=64, array={"line": 2})
     one = draw_returns(rng, 60, profile, near=False)

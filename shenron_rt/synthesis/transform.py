@@ -173,7 +173,7 @@ def _sample_rows(residuals: list[FloatArray]) -> IntArray:
     n = len(residuals[0])
     rows = [np.linspace(0, n - 1, min(n, SAMPLED_ECHOES)).astype(int)]
     if n > SAMPLED_ECHOES:
-        a, b = (x / max(float(np.ptp(x)), 1e-300) for x in residuals[:2])
+        a, b = (x / (float(np.ptp(x)) or 1.0) for x in residuals[:2])
         rows += [np.array([x.argmin(), x.argmax()]) for x in (*residuals, a + b, a - b)]
     found: IntArray = np.unique(np.concatenate(rows))
     return found
