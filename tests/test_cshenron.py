@@ -83,7 +83,11 @@ def test_the_loss_tables_over_the_true_angle(ref: Reference, short: str) -> None
     angle, level = ref["table_angle_rad"], np.full(91, np.pi / 2)
     for material, expected in enumerate(ref[f"{short}_loss_table"]):
         terms = released_terms(angle, level, np.full(91, material), _radar(short).start_hz)
-        np.testing.assert_allclose(np.stack(terms, axis=1), expected, rtol=RELATIVE, atol=ABSOLUTE)
+        for term, table in zip(terms, expected.T, strict=True):
+            # toward grazing a term is what is left of numbers of the table's largest size, whose sines and cosines
+            # differ in the last bit from processor to processor
+            rounding = 10 * np.finfo(float).eps * np.abs(table).max()
+            np.testing.assert_allclose(term, table, rtol=RELATIVE, atol=max(rounding, ABSOLUTE))
 
 
 @pytest.mark.parametrize("case", ["tic_v000", "tic_moving", "rb_moving"])

@@ -163,7 +163,6 @@ def _body(
     return Body(object_id, entry, mesh, tag, index[mesh.part], plane, patch, parts.links, face_link, vertex_link)
 
 
-@functools.lru_cache(maxsize=4)
 def _surfaces(
     mesh: TaggedMesh, part_material: tuple[int, ...], part_link: tuple[int, ...]
 ) -> tuple[TaggedMesh, IntArray, IntArray, FloatArray]:

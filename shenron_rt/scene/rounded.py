@@ -67,6 +67,7 @@ class Rounding:
         )
 
 
-@functools.lru_cache(maxsize=4)
+# a mesh handed to one scene after another is rounded once; two of the largest are some 0.2 GB
+@functools.lru_cache(maxsize=2)
 def _rounded(mesh: TaggedMesh, tolerance_m: float, below_deg: float, most: int) -> TaggedMesh:
     return round_mesh(mesh, tolerance_m, below_deg=below_deg, most_faces=most)
