@@ -46,9 +46,9 @@ Strongest cell of the range-azimuth map beyond 2 m. Each frame has its own seed 
 along and across and 5 degrees of yaw. Beyond 60 degrees `braking` has walls, whose cells are speckle, and a bollard,
 whose echo is the same in every frame to a decibel; the pattern takes 12.6 dB from it, from above the car to below. A
 foreign car is one painted shell of flat facets: where these are longer than what its curvature and the wavelength
-allow, its first bounce fades from aspect to aspect by more than that. Rounded (`round_below_deg`) its mean is what its
-curvature makes of it; it still has few glints, whose sum fades. Over several bounces recesses, and the road before it,
-send back more; with them some of the strongest cells are true ghosts of the car, in a wall, and count as other.
+allow, its first bounce fades from aspect to aspect by more than that. What its recesses, and the road before it, send
+back over several bounces fills these fades; with them some of the strongest cells are true ghosts of the car, in a
+wall, and count as other. What rounding does to it (`--rounded`) is in [limits](limits.md).
 
 """
 OBJECTS_HEAD = """
@@ -68,14 +68,13 @@ class Car(NamedTuple):
     round_below_deg: float | None = None
 
 
-def variants(name: str, mesh: TaggedMesh) -> list[Car]:
-    """Return a foreign car as it is and rounded, by its first bounce and by several."""
-    more = f"up to {FURTHER_BOUNCES} bounces"
+def variants(name: str, mesh: TaggedMesh, rounded: bool) -> list[Car]:
+    """Return a foreign car as it is or rounded, by its first bounce and by several."""
+    below = ROUND_BELOW_DEG if rounded else None
+    name = f"{name}, rounded" if rounded else name
     return [
-        Car(name, mesh),
-        Car(f"{name}, {more}", mesh, FURTHER_BOUNCES),
-        Car(f"{name}, rounded", mesh, 1, ROUND_BELOW_DEG),
-        Car(f"{name}, rounded, {more}", mesh, FURTHER_BOUNCES, ROUND_BELOW_DEG),
+        Car(name, mesh, 1, below),
+        Car(f"{name}, up to {FURTHER_BOUNCES} bounces", mesh, FURTHER_BOUNCES, below),
     ]
 
 
@@ -190,6 +189,7 @@ def main() -> None:
     """Parse, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--car", action="append", default=[], metavar="NAME=FILE", help="mesh of another car")
+    parser.add_argument("--rounded", action="store_true", help="round these meshes; takes an hour")
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--shown", type=int, default=4, help="frames with a row of their own")
     parser.add_argument("--out", type=Path, help="write here instead of printing")
@@ -197,7 +197,7 @@ def main() -> None:
     logging.disable(logging.WARNING)
     cars = [Car("bundled")]
     for name, _, file in (text.partition("=") for text in asked.car):
-        cars += variants(name, car_mesh(Path(file)))
+        cars += variants(name, car_mesh(Path(file)), asked.rounded)
     lines = []
     for line in page(cars, asked.shown, asked.frames):
         lines.append(line)
