@@ -2,7 +2,7 @@
 
 Prints the strongest cell of the range-azimuth map beyond 2 m, frame by frame, with the radar's antenna pattern and
 without its azimuth part, how often it is the car, and every object's power. ``--car NAME=FILE`` puts another car's mesh
-(ROS axes, metres) beside the bundled one: as it is and rounded, by its first bounce and by up to three; ``--out
+(ROS axes, metres) beside the bundled one, by its first bounce and by up to three, ``--rounded`` rounds it; ``--out
 docs/evidence.md`` writes the page. About 0.5 s a frame and radar, some seconds where a car is rounded.
 """
 
