@@ -6,7 +6,6 @@ import base64
 import json
 import logging
 import struct
-import time
 from pathlib import Path
 
 import numpy as np
@@ -80,19 +79,16 @@ def test_polygons_negative_indices_textures_crlf_continuations_and_comments(tmp_
     assert (mesh.face_normal[:, 2] == 1).all()
 
 
-def test_hundred_thousand_faces_read_in_a_second(tmp_path) -> None:
+def test_a_hundred_thousand_faces_of_two_forms_are_read(tmp_path) -> None:
     n = 225  # 2 * 224^2 = 100,352 faces
     x, y = np.meshgrid(np.arange(n), np.arange(n))
     lines = [f"v {a} {b} 0.125" for a, b in zip(x.ravel(), y.ravel(), strict=True)]
     corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1) + 1).ravel()
     lines += [f"f {a}/1/1 {a + 1}/1/1 {a + n + 1}/1/1\nf {a}//1 {a + n + 1}//1 {a + n}//1" for a in corner.tolist()]
     file = write(tmp_path, "grid.obj", "\n".join(lines))
-    start = time.process_time()
     mesh = read_mesh(file)
-    took = time.process_time() - start
     assert mesh.n_faces == 100_352
     assert mesh.face_area.sum() == pytest.approx(224**2, rel=1e-12)
-    assert took < 1.0  # measured 0.35 s of CPU time
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -34,6 +34,11 @@ def _table(head: tuple[str, ...], rows: list[list[str]]) -> str:
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
+def _tenths(value: float | np.floating[Any]) -> str:
+    """Return a level to a tenth; the last bit of a mean, which is the processor's, decides no digit."""
+    return f"{round(float(value), 9):.1f}"
+
+
 def _circles(found: Curves) -> dict[tuple[str, float, str], Circle]:
     """Return the circles that are there by shape, band and place."""
     keys = [(s, ghz, place) for s in STEP_DEG for ghz in BANDS_GHZ for place in PLACES]
@@ -45,7 +50,7 @@ def statistics(found: Curves) -> str:
     rows = []
     for (shape, ghz, place), circle in _circles(found).items():
         levels = (circle.median, circle.mean, circle.sigma, *(circle.highest(d) for d in ("front", "side", "back")))
-        rows.append([shape, f"{ghz:g}", PLACES[place], *(f"{v:.1f}" for v in levels)])
+        rows.append([shape, f"{ghz:g}", PLACES[place], *map(_tenths, levels)])
     return _table(("target", "GHz", "at", "median", "mean", "sigma", "front", "side", "back"), rows)
 
 
@@ -66,7 +71,7 @@ def _roof(found: Curves) -> list[list[str]]:
             "" if c is None else _beside(mean_dbsm(c.rcs_dbsm[c.x >= 80.0 - 1e-9]), level, SIGMA_DB["vehicle"])
             for c in curves
         ]
-        rows.append([shape, "roof lobe", f"{level:.1f}", *cells, "", ""])
+        rows.append([shape, "roof lobe", _tenths(level), *cells, "", ""])
     return rows
 
 
@@ -79,18 +84,18 @@ def published(found: Curves) -> str:
         levels = [measured_levels(shape, c) if (c := circles.get((shape, *p))) else {} for p in places]
         for name, (level, allowed) in published_levels(shape).items():
             cells = [_beside(m[name], level, allowed) if m else "" for m in levels]
-            rows.append([shape, name, f"{level:.1f}", *cells])
+            rows.append([shape, name, _tenths(level), *cells])
     low, high = HUMAN_SCHULTZ_DBSM
-    means = [f"{c.mean:.1f}" if (c := circles.get(("pedestrian", *p))) else "" for p in places]
+    means = [_tenths(c.mean) if (c := circles.get(("pedestrian", *p))) else "" for p in places]
     rows += [["pedestrian", "mean, at 9.4 GHz", f"{low:.1f} to {high:.1f}", *means], *_roof(found)]
     for name, (first, last, level) in BICYCLIST.items():
         cells = [
             _beside(c.sector(first, last), level, 3.41) if (c := circles.get(("bicycle", *p))) else "" for p in places
         ]
-        rows.append(["bicycle", f"mean {name}, with rider", f"{level:.1f}", *cells])
+        rows.append(["bicycle", f"mean {name}, with rider", _tenths(level), *cells])
     law = float(dbsm(distance.pole_on_turntable(NEAR_M)))
     cells = [_beside(c.mean, law, 1.0) if (c := circles.get(("pole", *p))) and p[1] != "far" else "" for p in places]
-    rows.append(["pole", "mean, closed form at 25 m", f"{law:.1f}", *cells])
+    rows.append(["pole", "mean, closed form at 25 m", _tenths(law), *cells])
     head = ("target", "what", "published", *(f"{ghz:g} GHz, {PLACES[place]}" for ghz, place in places))
     return _table(head, rows)
 
@@ -108,7 +113,7 @@ def why(found: Curves) -> str:
         if (curve := found.get(name)) is not None:
             circle = Circle.of(curve)
             sectors = (circle.sector(0.0, 30.0), circle.sector(60.0, 120.0), circle.sector(150.0, 180.0))
-            rows.append([shape, label, *(f"{v:.1f}" for v in (circle.median, circle.mean, *sectors))])
+            rows.append([shape, label, *map(_tenths, (circle.median, circle.mean, *sectors))])
     return _table(
         ("target", "25 m, 24 GHz unless it says", "median", "mean", "0-30 deg", "60-120 deg", "150-180 deg"), rows
     )
@@ -126,8 +131,8 @@ def sampling(found: Curves) -> str:
             cells = []
             for statistic in (np.median, mean_dbsm, lambda v: np.percentile(v, 10), np.max):
                 values = np.array([float(statistic(v)) for v in combs])
-                swing = "" if stride == 1 else f" ± {values.std():.1f}"
-                cells.append(f"{values.mean():.1f}{swing}")
+                swing = "" if stride == 1 else f" ± {_tenths(values.std())}"
+                cells.append(_tenths(values.mean()) + swing)
             rows.append([shape, f"{low:g} to {high:g}", f"{step:g}", str(len(combs[0])), *cells])
     return _table(("target", "window [deg]", "step [deg]", "aspects", "median", "mean", "10 %", "highest"), rows)
 
@@ -143,9 +148,9 @@ def distances(found: Curves) -> str:
             picked = np.linspace(0, len(curve.x) - 1, 4).round().astype(int)
             shown = [float(curve.x[k]) for k in picked]
             off = curve.rcs_dbsm - dbsm(distance.closed_form(name, curve.x, ghz))
-            cells = [f"{curve.rcs_dbsm[k]:.1f}" for k in picked]
+            cells = [_tenths(curve.rcs_dbsm[k]) for k in picked]
             rows.append(
-                [distance.TITLES[name], f"{ghz:g}", *cells, formula, f"{mean_dbsm(off):+.1f}", f"{np.std(off):.1f}"]
+                [distance.TITLES[name], f"{ghz:g}", *cells, formula, f"{mean_dbsm(off):+.1f}", _tenths(np.std(off))]
             )
     head = ("target", "GHz", *(f"{v:.1f} m" for v in shown or [5.0, 10.8, 23.2, 50.0]))
     return _table((*head, "closed form", "over it", "spread"), rows)
