@@ -22,6 +22,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -31,13 +32,14 @@ from .._typing import ComplexArray, FloatArray
 
 __all__ = ["SPACING", "Kernel", "series"]
 
-#: Oversampling of the grid, at least: the kernels of FINUFFT are then one cell narrower than at 2, for every accuracy.
+#: Oversampling of the grid: the kernels of FINUFFT are one cell narrower than at 2, for every accuracy.
 UPSAMPLING = 2.3
 SPACING = math.pi / UPSAMPLING
 #: Share of the tolerance that the series gets: its error is then a small part.
 SERIES_SHARE = 0.2
-#: Oversampling of the series, and its finest tolerance. The grid is small, so that the wider kernel costs less.
-SERIES_UPSAMPLING, SERIES_FINEST = 1.25, 1e-9
+#: Oversampling of the series, its finest tolerance, and oversampling beyond. The grid is small, so that a wider kernel
+#: costs less.
+SERIES_UPSAMPLING, SERIES_FINEST, SERIES_FINE_UPSAMPLING = 1.25, 1e-9, 2.0
 #: Side of the grid on which the kernel is looked at; more than the widest kernel.
 _SIDE = 32
 #: Degree of the polynomial in the square of the angle for the reciprocal of the kernel's transform.
@@ -46,6 +48,10 @@ _DEGREE = 20
 _FINEST = 14
 
 _OPTIONS = {"nthreads": 1, "spread_sort": 0, "showwarn": 0}
+
+
+def _types(single: bool) -> tuple[type[np.floating[Any]], type[np.complexfloating[Any, Any]]]:
+    return (np.float32, np.complex64) if single else (np.float64, np.complex128)
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,7 @@ class Kernel:
     @property
     def dtype(self) -> DTypeLike:
         """Of the grids it fills."""
-        return np.complex64 if self.single else np.complex128
+        return _types(self.single)[1]
 
     def correction(self, angle: FloatArray) -> FloatArray:
         """Return 1 / F of h s, or h t."""
@@ -102,7 +108,7 @@ def _spread(
 ) -> None:
     import finufft
 
-    real, complex_ = (np.float32, np.complex64) if single else (np.float64, np.complex128)
+    real, complex_ = _types(single)
     strength = strength.astype(complex_, copy=False)
     count = 1 if strength.ndim == 1 else len(strength)
     plan = finufft.Plan(
@@ -120,7 +126,7 @@ def _kernel(digits: int, single: bool) -> Kernel:
     def look(offset: FloatArray) -> NDArray[np.float64]:
         """Spread points some cells off the centre of a grid, each alone."""
         alone = np.eye(len(offset), dtype=np.complex128)
-        grids = np.empty((len(offset), _SIDE, _SIDE), dtype=np.complex64 if single else np.complex128)
+        grids = np.empty((len(offset), _SIDE, _SIDE), dtype=_types(single)[1])
         _spread(tolerance, single, offset * cell, 0 * offset, alone, grids)
         return grids.real.astype(np.float64)
 
@@ -156,9 +162,9 @@ def series(
     """
     import finufft
 
-    real, complex_ = (np.float32, np.complex64) if single else (np.float64, np.complex128)
+    real, complex_ = _types(single)
     asked = SERIES_SHARE * tolerance
-    upsampling = SERIES_UPSAMPLING if asked >= SERIES_FINEST else 2.0
+    upsampling = SERIES_UPSAMPLING if asked >= SERIES_FINEST else SERIES_FINE_UPSAMPLING
     plan = finufft.Plan(2, shape, 1, asked, 1, dtype=complex_, upsampfac=upsampling, **_OPTIONS)
     plan.setpts((SPACING * s).astype(real), (SPACING * t).astype(real))
 
