@@ -1,4 +1,4 @@
-"""Pictures: what they show, in which direction, and how fast they are made."""
+"""Pictures: what they show, and in which direction."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from run_tools import NAMES, hand_made_frame
 
+import shenron_rt as srt
 from shenron_rt.config.profile import load_profile
 from shenron_rt.dsp import noise_threshold
 from shenron_rt.plot import antenna_cuts, birds_eye, range_doppler, range_profile, top_view, write_pictures
@@ -68,6 +69,17 @@ def test_range_profile_shows_the_threshold_the_detections_and_the_truth(frame: A
     assert "post" in text
     assert "car" in text
     assert "static" not in text
+
+
+def test_names_of_objects_close_in_range_do_not_cover_each_other() -> None:
+    scene = srt.load_scene("braking")
+    frame = srt.simulate(scene, rays=2000)
+    figure = range_profile(frame.cube, truth=truth_of(frame.returns, scene.object_names()))
+    figure.canvas.draw()
+    names = figure.axes[0].texts
+    assert {t.get_text() for t in names} >= {"bollard", "left_wall", "right_wall"}  # 1.5 m from first to last
+    boxes = [t.get_window_extent() for t in names]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
 
 
 def test_range_doppler_has_range_up_velocity_right_and_rings_on_the_detections(frame: Any) -> None:

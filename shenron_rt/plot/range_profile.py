@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["range_profile"]
 
 _MAX_LABELS = 8
+#: Rows of labels, and the width of a character of them over that of the axes, on average.
+_LABEL_ROWS, _CHARACTER = 3, 0.0078
 
 
 def range_profile(
@@ -48,7 +50,7 @@ def range_profile(
     matplotlib.figure.Figure
     """
     figure, axes = new_figure(9.0, 4.6)
-    axes.set_position((0.08, 0.19, 0.90, 0.65))
+    axes.set_position((0.08, 0.19, 0.90, 0.62))
     rows = np.arange(len(cube.range_m))
     best = cube.range_doppler.argmax(axis=1)
     level = dbm(cube.range_doppler[rows, best])
@@ -84,15 +86,16 @@ def _pfa(cube: RadarCube) -> str:
 def _ticks(axes: Axes, truth: Sequence[Truth], last_m: float) -> None:
     """Mark true ranges along the top; labels of the strongest few, stacked where they would touch."""
     shown = sorted((t for t in truth[:_MAX_LABELS] if t.range_m <= last_m), key=lambda t: t.range_m)
-    before, step = -np.inf, 0
+    ends = [-np.inf] * _LABEL_ROWS
     for item in shown:
-        step = (step + 1) % 2 if item.range_m - before < 0.09 * last_m else 0
-        before = item.range_m
+        at, half = item.range_m / last_m, _CHARACTER * (len(item.name) + 1) / 2
+        step = next((row for row, end in enumerate(ends) if at - half >= end), int(np.argmin(ends)))
+        ends[step] = at + half
         transform = axes.get_xaxis_transform()
         axes.plot(
-            [item.range_m] * 2, [0.96, 1.0 + 0.05 * step], transform=transform, color=TRUTH, lw=1.6, clip_on=False
+            [item.range_m] * 2, [0.96, 1.0 + 0.055 * step], transform=transform, color=TRUTH, lw=1.6, clip_on=False
         )
         axes.text(
-            item.range_m, 1.015 + 0.05 * step, item.name, transform=transform, color=TRUTH, fontsize=8,
+            item.range_m, 1.015 + 0.055 * step, item.name, transform=transform, color=TRUTH, fontsize=8,
             ha="center", va="bottom",
         )  # fmt: skip
